@@ -1,0 +1,12 @@
+//! CSV tables and TOML documents in which every value knows its place, and the records set aside.
+//!
+//! The readers of `pose`, `camera`, `detection` and `pipeline` stand on these, so that all of them
+//! report a fault in the same words.
+
+mod document;
+mod reject;
+mod table;
+
+pub use document::{Document, Section};
+pub use reject::{Reason, Reject};
+pub use table::{Row, Table};

@@ -1,0 +1,5 @@
+//! rockmap: maps of rocks from posed pictures.
+
+pub mod error;
+pub mod frame;
+pub mod input;

@@ -1,0 +1,2 @@
+//! The `rockmap` program.
+fn main() {}
