@@ -1,0 +1,140 @@
+//! What a detector marked in the pictures.
+
+mod reader;
+
+pub use reader::{DetectionFile, read_detections};
+
+use crate::frame::Pixel;
+
+/// One mark of a detector, as its file gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// The image it was made in.
+    pub image_id: String,
+    /// Its name within the image.
+    pub det_id: String,
+    /// What it is said to be.
+    pub class: Option<String>,
+    /// How sure the detector was, 0 to 1.
+    pub score: Option<f64>,
+    /// Size of the object where the detector measured it, metres.
+    pub diameter_m: Option<f64>,
+    /// Where the mark is.
+    pub mark: Mark,
+    /// Slant range from the camera's centre (the body's origin without a camera), metres.
+    pub range_m: Option<f64>,
+    /// Standard deviations that the record itself gives.
+    pub sigma: MarkSigma,
+    /// Which of the run's detection files it comes from, by index.
+    pub file: usize,
+    /// Its line in that file.
+    pub line: u64,
+}
+
+/// Where a detector put its mark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mark {
+    /// A box in the raw picture.
+    Box(PixelBox),
+    /// A point of the raw picture.
+    Point(Pixel),
+    /// A direction in the body's x-y plane, radians clockwise from its x (forward) axis; always
+    /// with a range.
+    Bearing(f64),
+    /// A direction in the local horizontal plane, radians clockwise from true north; always with a
+    /// range.
+    Azimuth(f64),
+}
+
+/// A box by its edges, pixels; an edge may lie outside the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PixelBox {
+    /// Left edge.
+    pub x_min: f64,
+    /// Upper edge.
+    pub y_min: f64,
+    /// Right edge.
+    pub x_max: f64,
+    /// Lower edge.
+    pub y_max: f64,
+}
+
+/// Standard deviations of one mark, where its file gives them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MarkSigma {
+    /// Of the column, pixels.
+    pub u_px: Option<f64>,
+    /// Of the row, pixels.
+    pub v_px: Option<f64>,
+    /// Of the range, metres.
+    pub range_m: Option<f64>,
+    /// Of the bearing or azimuth, radians.
+    pub bearing: Option<f64>,
+}
+
+/// Which point of a box is taken for the object's place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Aim {
+    /// A share of the box's height from its top: 0.5 is the centre, 1 the bottom's middle.
+    HeightShare(f64),
+}
+
+impl Aim {
+    /// The middle of the box.
+    pub const CENTER: Self = Self::HeightShare(0.5);
+    /// The middle of its lower edge.
+    pub const BOTTOM: Self = Self::HeightShare(1.0);
+}
+
+impl PixelBox {
+    /// The aim point; the box's true one, also where the box leaves the picture.
+    pub fn aim_point(&self, aim: Aim) -> Pixel {
+        let Aim::HeightShare(share) = aim;
+        Pixel::new(
+            0.5 * (self.x_min + self.x_max),
+            self.y_min + share * (self.y_max - self.y_min),
+        )
+    }
+
+    /// Width, pixels.
+    pub fn width(&self) -> f64 {
+        self.x_max - self.x_min
+    }
+
+    /// Height, pixels.
+    pub fn height(&self) -> f64 {
+        self.y_max - self.y_min
+    }
+
+    /// Whether any of it lies in a picture of this size.
+    pub fn meets(&self, width: u32, height: u32) -> bool {
+        self.x_max >= -0.5
+            && self.y_max >= -0.5
+            && self.x_min <= f64::from(width) - 0.5
+            && self.y_min <= f64::from(height) - 0.5
+    }
+
+    /// Whether all of it lies at least `margin` pixels inside a picture of this size.
+    pub fn is_whole(&self, width: u32, height: u32, margin: f64) -> bool {
+        self.x_min >= margin - 0.5
+            && self.y_min >= margin - 0.5
+            && self.x_max <= f64::from(width) - 0.5 - margin
+            && self.y_max <= f64::from(height) - 0.5 - margin
+    }
+}
+
+impl Detection {
+    /// The mark in the picture under an aim, if it is one.
+    pub fn aim_point(&self, aim: Aim) -> Option<Pixel> {
+        match self.mark {
+            Mark::Box(b) => Some(b.aim_point(aim)),
+            Mark::Point(pixel) => Some(pixel),
+            Mark::Bearing(_) | Mark::Azimuth(_) => None,
+        }
+    }
+
+    /// The key its rejects and evidence name it by.
+    pub fn key(&self) -> String {
+        format!("{}/{}", self.image_id, self.det_id)
+    }
+}
