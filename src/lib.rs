@@ -3,5 +3,6 @@
 pub mod detection;
 pub mod error;
 pub mod frame;
+pub mod fuse;
 pub mod input;
 pub mod pose;

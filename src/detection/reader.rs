@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{Detection, Mark, MarkSigma, PixelBox};
 use crate::error::{Error, Fault};
 use crate::frame::Pixel;
-use crate::input::{Reason, Reject, Row, Table};
+use crate::input::{Reject, Row, Table};
 
 /// What a detections.csv holds.
 #[derive(Debug)]
@@ -71,13 +71,7 @@ pub fn read_detections(path: &Path, shown: &str, file: usize) -> Result<Detectio
         let record = row.as_ref().map(key).unwrap_or_default();
         match row.and_then(|row| detection(&row, kinds, file)) {
             Ok(detection) => read.detections.push(detection),
-            Err(fault) => read.rejects.push(Reject {
-                file: shown.to_owned(),
-                line: fault.place.line,
-                record,
-                reason: Reason::BadValue,
-                detail: fault.to_string(),
-            }),
+            Err(fault) => read.rejects.push(Reject::from_fault(fault, record)),
         }
     }
     Ok(read)
@@ -182,6 +176,7 @@ fn pixel_box(row: &Row<'_>) -> Result<PixelBox, Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detection::Aim;
 
     fn read(text: &str) -> Result<DetectionFile, Error> {
         let folder = tempfile::tempdir().unwrap();
@@ -228,7 +223,7 @@ mod tests {
              a,5,0.5,1,2,5,10\n",
         )
         .unwrap();
-        let details: Vec<&str> = file.rejects.iter().map(|r| r.detail.as_str()).collect();
+        let details: Vec<String> = file.rejects.iter().map(Reject::to_string).collect();
         assert_eq!(
             details,
             [

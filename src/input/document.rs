@@ -374,6 +374,21 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// A number within bounds, or one of a few words: `Ok` the one, `Err` the other.
+    pub fn number_or_word(
+        &self,
+        key: &str,
+        words: &[&str],
+        bounds: impl RangeBounds<f64>,
+        number: &str,
+    ) -> Option<Result<f64, String>> {
+        if let Some(Kind::Number(_)) = self.get(key).map(|n| &n.kind) {
+            let expected = format!("{}, or {number}", words.join(", "));
+            return self.number(key, bounds, &expected).map(Ok);
+        }
+        self.word(key, words).map(Err)
+    }
+
     /// Records a fault for every key that was never asked for, with the nearest known one.
     pub fn finish(self) {
         let Some(Kind::Table(entries)) = self.node.map(|n| &n.kind) else {

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::error::{Fault, Place};
+
 /// Why a record was set aside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -100,4 +102,34 @@ pub struct Reject {
     pub reason: Reason,
     /// The particulars, in words.
     pub detail: String,
+}
+
+impl Reject {
+    /// A record that a fault keeps from being read.
+    pub fn from_fault(fault: Fault, record: impl Into<String>) -> Self {
+        let Fault {
+            place,
+            field,
+            problem,
+        } = fault;
+        let detail = Fault::new(Place::default(), field, problem).to_string();
+        Self {
+            file: place.file,
+            line: place.line,
+            record: record.into(),
+            reason: Reason::BadValue,
+            detail,
+        }
+    }
+}
+
+impl fmt::Display for Reject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let place = Place {
+            file: self.file.clone(),
+            line: self.line,
+            column: None,
+        };
+        write!(f, "{place}: {}", self.detail)
+    }
 }

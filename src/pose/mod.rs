@@ -10,6 +10,7 @@ mod time;
 mod track;
 
 pub use reader::{PoseFile, read_poses};
+pub(crate) use reader::{pan_tilt, time};
 pub use record::{Attitude, PoseKey, PoseRow, Position};
 pub use time::Time;
 pub use track::{NoPose, Track};

@@ -7,7 +7,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use super::{Attitude, PoseKey, PoseRow, Position, Time};
 use crate::error::{Error, Fault};
 use crate::frame::{Crs, Geodetic, Point};
-use crate::input::{Reason, Reject, Row, Table};
+use crate::input::{Reject, Row, Table};
 
 /// What a poses.csv holds.
 #[derive(Debug)]
@@ -116,13 +116,7 @@ pub fn read_poses(path: &Path, shown: &str, crs: Option<&Crs>) -> Result<PoseFil
         };
         match row.and_then(|row| pose_row(&row, is_per_image, positions, attitudes)) {
             Ok(row) => file.rows.push(row),
-            Err(fault) => file.rejects.push(Reject {
-                file: shown.to_owned(),
-                line: fault.place.line,
-                record,
-                reason: Reason::BadValue,
-                detail: fault.to_string(),
-            }),
+            Err(fault) => file.rejects.push(Reject::from_fault(fault, record)),
         }
     }
     Ok(file)
