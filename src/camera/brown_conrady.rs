@@ -109,7 +109,8 @@ impl BrownConrady {
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
         let (plane, by_point) = plane_of_point(point.xyz)?;
         let (distorted, by_plane) = self.distort(plane)?;
-        if !(by_plane.determinant() > 0.0) {
+        let upright = by_plane.determinant() > 0.0;
+        if !upright {
             return Err(LensError::OutsideField);
         }
         let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
