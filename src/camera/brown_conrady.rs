@@ -149,10 +149,14 @@ impl BrownConrady {
         let (seen, mut jacobian) = self.distort(place)?;
         let mut miss = distorted - seen;
         let enough = 4.0 * f64::EPSILON * (1.0 + distorted.norm());
+        // The error of a step is of the order of its square; a hundred covers the curvature.
+        let last = |step: Vector2<f64>, inverse: &Matrix2<f64>| {
+            100.0 * step.norm_squared() * inverse.norm() <= f64::EPSILON
+        };
         for _ in 0..60 {
             let inverse = upright_inverse(&jacobian)?;
             let step = inverse * miss;
-            if miss.norm() <= enough {
+            if miss.norm() <= enough || last(step, &inverse) {
                 return Ok((place + step, inverse));
             }
             let mut share = 1.0;
@@ -196,7 +200,7 @@ impl BrownConrady {
         if norm == 0.0 {
             return Ok(distorted);
         }
-        match self.radial.radius(norm) {
+        match self.radial.radius(norm, 1e-3) {
             Ok(radius) => Ok(distorted * (radius.min(0.999 * self.radial.limit()) / norm)),
             Err(LensError::OutsideField) if self.radial.limit().is_finite() => {
                 Ok(distorted * (0.999 * self.radial.limit() / norm))

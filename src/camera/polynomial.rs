@@ -3,12 +3,12 @@
 /// The value and the derivative at `x`.
 #[inline]
 pub(super) fn evaluate<const N: usize>(coefficients: &[f64; N], x: f64) -> (f64, f64) {
-    coefficients
-        .iter()
-        .rev()
-        .fold((0.0, 0.0), |(value, slope), &c| {
-            (value * x + c, slope * x + value)
-        })
+    let (mut value, mut slope) = (0.0, 0.0);
+    for i in (0..N).rev() {
+        slope = slope * x + value;
+        value = value * x + coefficients[i];
+    }
+    (value, slope)
 }
 
 /// The product of two polynomials.
