@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2};
 
-use super::perspective::{direction_of_plane, plane_of_point};
+use super::perspective::{direction_of_plane, plane_of_point, product};
 use super::radial::Radial;
 use super::sensor::Sensor;
 use super::{BadLens, Intrinsics, LensError, central_ray};
@@ -98,7 +98,7 @@ impl BrownConrady {
             self.radial.undistort(distorted)?
         };
         let (direction, by_plane) = direction_of_plane(plane);
-        let jacobian = by_plane * by_distorted * distorted_by_pixel;
+        let jacobian = product(&by_plane, &product(&by_distorted, &distorted_by_pixel));
         Ok((central_ray(direction), jacobian))
     }
 
@@ -114,7 +114,10 @@ impl BrownConrady {
             return Err(LensError::OutsideField);
         }
         let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
-        Ok((pixel, by_distorted * by_plane * by_point))
+        Ok((
+            pixel,
+            product(&product(&by_distorted, &by_plane), &by_point),
+        ))
     }
 
     /// The distorted place of a place on the plane at unit depth, and its derivative.
@@ -155,7 +158,7 @@ impl BrownConrady {
         };
         for _ in 0..60 {
             let inverse = upright_inverse(&jacobian)?;
-            let step = inverse * miss;
+            let step = product(&inverse, &miss);
             if miss.norm() <= enough || last(step, &inverse) {
                 return Ok((place + step, inverse));
             }

@@ -103,8 +103,13 @@ impl Radial {
             return Err(LensError::OutsideField);
         }
         let (factor, slope) = self.factor(s);
-        let jacobian =
-            Matrix2::from_diagonal_element(factor) + place * place.transpose() * (2.0 * slope);
+        let bend = place * (2.0 * slope);
+        let jacobian = Matrix2::new(
+            factor + place.x * bend.x,
+            place.x * bend.y,
+            place.y * bend.x,
+            factor + place.y * bend.y,
+        );
         Ok((place * factor, jacobian))
     }
 
