@@ -1,9 +1,43 @@
 //! rockmap: maps of rocks from posed pictures.
+//!
+//! A datum flows one way, and a module uses only those above it:
+//!
+//! | module | what it does |
+//! |---|---|
+//! | [`error`] | what can go wrong at the edges, and how it is said |
+//! | [`frame`] | typed points, rays, transforms; ellipsoids and coordinate reference systems |
+//! | [`input`] | tables and documents in which every value knows its place; records set aside |
+//! | [`pose`] | pose logs: where the platform was at a time |
+//! | [`camera`] | lens models and mounts: pixels to rays and back |
+//! | [`detection`] | what a detector marked |
+//! | [`view`] | a picture with its pose and camera |
+//! | [`terrain`] | the ground: height at a place, first hit of a ray |
+//! | [`project`] | a detection on the ground, with its uncertainty |
+//! | [`fuse`] | detections of many views to one map of objects |
+//! | [`footprint`] | what a view could have seen |
+//! | [`publish`] | maps, tables, annotated pictures |
+//! | [`pipeline`] | a pipeline file to a map |
+//! | [`cli`] | the command line |
+
+pub mod error;
+pub mod frame;
+pub mod input;
+
+pub mod pose;
 
 pub mod camera;
 pub mod detection;
-pub mod error;
-pub mod frame;
+pub mod terrain;
+pub mod view;
+
+pub mod project;
+
 pub mod fuse;
-pub mod input;
-pub mod pose;
+
+pub mod footprint;
+
+pub mod publish;
+
+pub mod pipeline;
+
+pub mod cli;
