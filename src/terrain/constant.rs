@@ -64,7 +64,7 @@ mod tests {
     fn on_a_sphere_the_closed_form_holds() {
         let site = Site::new(Planet::MOON, Geodetic::from_degrees(-45.0, 12.0, 500.0));
         let radius = 1_737_400.0 + 480.0;
-        for (up, down_deg) in [(1.5, 1.0), (1.5, 0.33), (800.0, 30.0), (60_000.0, 14.0), (3.0, 90.0)] {
+        for (up, down_deg) in [(1.5, 1.0), (1.5, 0.5), (800.0, 30.0), (60_000.0, 16.0), (3.0, 90.0)] {
             let ray = ray([300.0, -4000.0, up], 77.0, down_deg);
             let centre = Vector3::new(0.0, 0.0, -(1_737_400.0 + 500.0));
             let m = ray.origin.xyz - centre;

@@ -58,11 +58,20 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
     let (mut known, mut started) = (false, false);
     loop {
         let (height, over) = above(terrain, ray, t);
-        if t > far {
-            let top = constant::first_not_above(&site(), ray, model.top_m, far);
-            return Err(if top.is_none() { Miss::AboveHorizon } else { Miss::TooFar });
-        }
         let rises = site().up(site().geodetic(ray.at(t))).xyz().dot(&direction) > 0.0;
+        if !known && over.is_none() && height <= model.top_m && (t > far || height < model.bottom_m || t > 1000.0)
+        {
+            return Err(if rises { Miss::AboveHorizon } else { Miss::OffTerrain });
+        }
+        if t > far {
+            // Beyond all rasters the height outside is all that can be met.
+            let left = model
+                .within_bounds(ray.origin, [direction.x, direction.y])
+                .is_none_or(|(_, leave)| leave < far);
+            let highest = model.outside_m.filter(|_| left).unwrap_or(model.top_m);
+            let later = constant::first_not_above(&site(), ray, highest, far);
+            return Err(if later.is_none() { Miss::AboveHorizon } else { Miss::TooFar });
+        }
         let step = match over {
             Some(over) if over <= 0.0 => {
                 return match (started, known) {
@@ -84,9 +93,6 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
         };
         if height > model.top_m && rises {
             return Err(Miss::AboveHorizon);
-        }
-        if !known && (height < model.bottom_m || t > 1000.0) {
-            return Err(Miss::OffTerrain);
         }
         started = true;
         before = t;

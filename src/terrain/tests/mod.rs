@@ -68,7 +68,7 @@ fn the_height_at_a_place_is_that_between_its_posts() {
     for (dx, dy, expected) in [
         (0.0, 0.0, 50.0),  // the mean of the four
         (0.0, 0.5, 35.0),  // 3/4 of (10 + 30) / 2 and 1/4 of (50 + 110) / 2
-        (-0.5, -0.5, 51.25), // (3/16) 10 + (1/16) 30 + (9/16) 50 + (3/16) 110
+        (-0.5, -0.5, 52.5), // (3/16) 10 + (1/16) 30 + (9/16) 50 + (3/16) 110
     ] {
         let found = at(dx, dy).unwrap();
         // The vertical of the site's frame is that of its origin: the tilt over 1 m is 1e-7, and
