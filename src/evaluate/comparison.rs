@@ -389,3 +389,6 @@ fn places_of_truth(
     };
     objects.iter().map(placed).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -139,3 +139,80 @@ impl Existence {
 fn edge(bin: usize) -> f64 {
     count(bin) / count(BINS)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Squared errors of two normal variables each, `scale` times too large.
+    fn simulated(n: usize, scale: f64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        // The squared norm of two standard normal variables is -2 ln u.
+        let error = |_| -2.0 * scale * (1.0 - rng.random::<f64>()).ln();
+        (0..n).map(error).collect()
+    }
+
+    #[test]
+    fn a_consistent_map_scores_two_and_95_percent() {
+        let c = Consistency::of(&simulated(200_000, 1.0));
+        assert!((c.nees.unwrap() - 2.0).abs() < 0.02, "{c:?}");
+        assert!((c.nees_per_dof.unwrap() - 1.0).abs() < 0.01);
+        assert!((c.coverage_95.unwrap() - 0.95).abs() < 0.002);
+        let [low, high] = c.nees_95.unwrap();
+        assert!(low < c.nees.unwrap() && c.nees.unwrap() < high);
+    }
+
+    #[test]
+    fn an_overconfident_map_is_found_out() {
+        // Errors twice what is stated: NEES 8, coverage 1 - 0.05^(1/4).
+        let c = Consistency::of(&simulated(200_000, 4.0));
+        assert!((c.nees.unwrap() - 8.0).abs() < 0.08, "{c:?}");
+        assert!((c.coverage_95.unwrap() - (1.0 - 0.05f64.powf(0.25))).abs() < 0.004);
+        assert!(c.nees.unwrap() > c.nees_95.unwrap()[1]);
+    }
+
+    /// scipy: `chi2.ppf([0.025, 0.975], 2 n) / n` for n = 10 and 100.
+    #[test]
+    fn the_interval_is_that_of_scipy() {
+        for (n, expected) in [
+            (10.0, [0.959077739, 3.416960690]),
+            (100.0, [1.627279825, 2.410578955]),
+        ] {
+            for (found, expected) in mean_nees_interval(n).into_iter().zip(expected) {
+                assert!(
+                    (found / expected - 1.0).abs() < 2e-3,
+                    "{n}: {found} {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn bins_hold_what_lies_in_them() {
+        let objects = [
+            (0.0, false),
+            (0.05, true),
+            (0.3, false),
+            (0.7, true),
+            (0.75, false),
+            (1.0, true),
+        ];
+        let e = Existence::of(&objects).unwrap();
+        let n: Vec<usize> = e.bins.iter().map(|b| b.n).collect();
+        assert_eq!(n, [2, 0, 0, 1, 0, 0, 0, 2, 0, 1]);
+        assert_eq!(
+            (e.bins[0].mean_p, e.bins[0].exist),
+            (Some(0.025), Some(0.5))
+        );
+        assert_eq!((e.bins[1].mean_p, e.bins[1].exist), (None, None));
+        assert_eq!(e.bins[7].exist, Some(0.5));
+        assert_eq!((e.bins[3].low, e.bins[3].high), (0.3, 0.4));
+        // Brier: (0 + 0.9025 + 0.09 + 0.09 + 0.5625 + 0) / 6.
+        assert!((e.brier - 1.645 / 6.0).abs() < 1e-12);
+        // Gaps: |0.05 - 1| + 0.3 + |1.45 - 1| + 0, over six objects.
+        assert!((e.calibration_error - 1.7 / 6.0).abs() < 1e-12);
+        assert_eq!(Existence::of(&[]), None);
+    }
+}

@@ -32,8 +32,8 @@ pub use picture::picture;
 pub use report::{Counts, Report};
 pub use score::{ClassScore, Detection, Gospa};
 pub use truth::{
-    DetectionKey, IgnoredPlace, Labels, Membership, TrueObject, read_evidence, read_ignored,
-    read_labels, read_truth,
+    DetectionKey, Evidence, IgnoredPlace, Labels, Membership, TrueObject, read_evidence,
+    read_ignored, read_labels, read_truth,
 };
 
 use std::path::{Path, PathBuf};

@@ -41,8 +41,21 @@ pub struct DetectionKey {
 /// The true object of every labelled detection.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Labels {
+    /// The name faults call the file by.
+    pub file: String,
     /// Object by detection; `None` where the detection is known to be of no object (clutter).
     pub object_of: BTreeMap<DetectionKey, Option<String>>,
+    /// Whether keys hold the image.
+    pub by_image: bool,
+}
+
+/// The memberships of detections in mapped objects.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Evidence {
+    /// The name faults call the file by.
+    pub file: String,
+    /// The memberships, in the order of the file.
+    pub memberships: Vec<Membership>,
     /// Whether keys hold the image.
     pub by_image: bool,
 }
@@ -87,7 +100,7 @@ pub fn read_labels(path: &Path, shown: &str) -> Result<Labels, Error> {
 ///
 /// # Errors
 /// As [`read_truth`].
-pub fn read_evidence(path: &Path, shown: &str) -> Result<Vec<Membership>, Error> {
+pub fn read_evidence(path: &Path, shown: &str) -> Result<Evidence, Error> {
     evidence_of(Table::open(path, shown)?)
 }
 
@@ -126,7 +139,7 @@ fn ignored_of(table: Table) -> Result<Vec<IgnoredPlace>, Error> {
 }
 
 fn labels_of(table: Table) -> Result<Labels, Error> {
-    let by_image = table.has("image_id");
+    let (file, by_image) = (table.file().to_owned(), table.has("image_id"));
     let mut object_of = BTreeMap::new();
     rows(table, &["det_id", "object_id"], |row| {
         let key = detection(row, by_image)?;
@@ -143,19 +156,25 @@ fn labels_of(table: Table) -> Result<Labels, Error> {
         Ok(())
     })?;
     Ok(Labels {
+        file,
         object_of,
         by_image,
     })
 }
 
-fn evidence_of(table: Table) -> Result<Vec<Membership>, Error> {
-    let by_image = table.has("image_id");
-    rows(table, &["rock_id", "det_id"], |row| {
+fn evidence_of(table: Table) -> Result<Evidence, Error> {
+    let (file, by_image) = (table.file().to_owned(), table.has("image_id"));
+    let memberships = rows(table, &["rock_id", "det_id"], |row| {
         Ok(Membership {
             rock_id: row.required_text("rock_id")?.to_owned(),
             detection: detection(row, by_image)?,
             weight: row.number_within("weight", 0.0, 1.0)?.unwrap_or(1.0),
         })
+    })?;
+    Ok(Evidence {
+        file,
+        memberships,
+        by_image,
     })
 }
 
@@ -293,6 +312,6 @@ mod tests {
         );
         let text = "rock_id,det_id\nr1,1\n";
         let evidence = evidence_of(table(text, "evidence.csv")).unwrap();
-        assert_eq!(evidence[0].weight, 1.0);
+        assert_eq!(evidence.memberships[0].weight, 1.0);
     }
 }

@@ -1,6 +1,0 @@
-//! stub
-use super::Evaluation;
-/// stub
-pub fn picture(_e: &Evaluation) -> String {
-    String::new()
-}
