@@ -256,13 +256,13 @@ mod tests {
     fn hungarian(n_left: usize, n_right: usize, pairs: &[Pair], price: f64) -> f64 {
         let n = n_left + n_right;
         let mut a = vec![vec![1e9; n + 1]; n + 1];
-        for i in 1..=n {
-            for j in 1..=n {
-                if (i > n_left) == (j > n_right) {
-                    a[i][j] = if i > n_left { 0.0 } else { 1e9 };
-                } else {
-                    a[i][j] = price;
-                }
+        for (i, row) in a.iter_mut().enumerate() {
+            for (j, cost) in row.iter_mut().enumerate() {
+                *cost = match (i > n_left, j > n_right) {
+                    (true, true) => 0.0,
+                    (false, false) => 1e9,
+                    _ => price,
+                };
             }
         }
         for p in pairs {

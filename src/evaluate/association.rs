@@ -44,7 +44,7 @@ pub struct Association {
 ///
 /// # Errors
 /// Labels and memberships that do not name detections in the same way: one names the image and the
-/// other does not, where det_id alone is ambiguous.
+/// other does not, where `det_id` alone is ambiguous.
 pub fn associate(
     comparison: &Comparison,
     labels: &Labels,

@@ -31,7 +31,7 @@ pub struct Estimate {
     pub ellipse: Option<Ellipse>,
 }
 
-/// Reads a GeoJSON FeatureCollection of points.
+/// Reads a GeoJSON `FeatureCollection` of points.
 ///
 /// Only the geometry is required. Of the properties `rock_id`, `class`, `p_exist`, `sigma_major_m`,
 /// `sigma_minor_m` and `sigma_az_deg` are read, and each may be null or missing. The planet is

@@ -174,7 +174,7 @@ impl Report {
         let (c, o) = (&self.counts, &self.options);
         let besides = |n: usize, why: &str| match n {
             0 => String::new(),
-            n => format!("; not {n} {why}"),
+            n => format!("; {n} {why} left out"),
         };
         let estimates = format!(
             "of {} in the map{}{}",
@@ -282,20 +282,23 @@ impl Report {
 }
 
 fn association_lines(a: &Association) -> Vec<Line> {
-    let associated = format!(
-        "{} of {} labelled detections in a mapped object",
-        a.n_associated, a.n_labelled
-    );
-    let mut clutter = format!(
-        "{} of {} clutter detections in one",
-        a.n_clutter_associated, a.n_clutter
-    );
+    let mut labelled = format!("of {} labelled detections", a.n_labelled);
     if a.n_left_out > 0 {
-        let _ = write!(clutter, "; {} left out", a.n_left_out);
+        let _ = write!(labelled, "; {} of no true object left out", a.n_left_out);
     }
     vec![
-        line("purity", share(a.purity), associated),
-        line("completeness", share(a.completeness), clutter),
+        line(
+            "detections in objects",
+            a.n_associated.to_string(),
+            labelled,
+        ),
+        line(
+            "clutter in objects",
+            a.n_clutter_associated.to_string(),
+            format!("of {} clutter detections", a.n_clutter),
+        ),
+        line("purity", share(a.purity), String::new()),
+        line("completeness", share(a.completeness), String::new()),
         line("pair precision", share(a.pair_precision), String::new()),
         line("pair recall", share(a.pair_recall), String::new()),
         line("pair F1", share(a.pair_f1), String::new()),
@@ -390,5 +393,10 @@ fn share(x: Option<f64>) -> String {
 }
 
 fn metres(x: Option<f64>) -> String {
-    x.map_or_else(none, |x| format!("{x:.4} m"))
+    match x {
+        // What rounds to zero is shown without a sign.
+        Some(x) if x.abs() < 5e-5 => "0.0000 m".to_owned(),
+        Some(x) => format!("{x:.4} m"),
+        None => none(),
+    }
 }

@@ -196,7 +196,7 @@ mod tests {
     }
 
     /// GOSPA and its parts by Stone Soup 1.9.1, OSPA over all permutations, F1 by scipy's assignment:
-    /// tests/reference/stonesoup_metrics.py.
+    /// `tests/reference/stonesoup_metrics.py`.
     #[test]
     fn gospa_ospa_and_f1_are_those_of_stone_soup() {
         for (case, (estimates, truths, cutoff, radius, gospa, ospa, f1)) in

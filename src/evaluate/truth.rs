@@ -32,7 +32,7 @@ pub struct IgnoredPlace {
 /// What names a detection.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DetectionKey {
-    /// The image; empty where det_id alone names a detection.
+    /// The image; empty where `det_id` alone names a detection.
     pub image_id: String,
     /// The detection.
     pub det_id: String,
@@ -87,7 +87,7 @@ pub fn read_ignored(path: &Path, shown: &str) -> Result<Vec<IgnoredPlace>, Error
     ignored_of(Table::open(path, shown)?)
 }
 
-/// Reads labels.csv: `det_id, object_id`, and `image_id` where det_id repeats. An empty
+/// Reads labels.csv: `det_id, object_id`, and `image_id` where `det_id` repeats. An empty
 /// `object_id` says that the detection is of no object.
 ///
 /// # Errors
