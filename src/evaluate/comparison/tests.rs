@@ -256,3 +256,17 @@ fn a_map_of_nothing_is_scored() {
     assert!((report.gospa.gospa_m - 0.125f64.sqrt()).abs() < 1e-12);
     assert_eq!(report.warnings, ["no mapped object counts"]);
 }
+
+#[test]
+fn a_radius_that_pairs_all_with_all_is_refused() {
+    let crowd = 8_000;
+    let name = |i: u32| format!("{i}");
+    let known = truth((0..crowd).map(|i| object(&name(i), 0.0, 0.0)).collect());
+    let estimates = (0..crowd).map(|i| rock(&name(i), 0.0, 0.0)).collect();
+    let error = Comparison::new(&map(estimates), &known, &Options::default()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "--radius: found 0.3 m, with 64000000 pairs of objects within it, expected at most \
+         50000000 pairs"
+    );
+}

@@ -254,7 +254,7 @@ fn ellipses(comparison: &Comparison, scale: &Scale) -> String {
             out,
             "<ellipse cx=\"{x:.2}\" cy=\"{y:.2}\" rx=\"{rx:.2}\" ry=\"{ry:.2}\" \
              transform=\"rotate({turn:.2} {x:.2} {y:.2})\" fill=\"{colour}\" \
-             fill-opacity=\"0.10\" stroke=\"{colour}\" stroke-opacity=\"0.55\" \
+             fill-opacity=\"0.07\" stroke=\"{colour}\" stroke-opacity=\"0.55\" \
              stroke-width=\"0.8\"/>"
         );
     }
