@@ -16,6 +16,7 @@
 //! | [`fuse`] | detections of many views to one map of objects |
 //! | [`footprint`] | what a view could have seen |
 //! | [`publish`] | maps, tables, annotated pictures |
+//! | [`evaluate`] | a map against truth |
 //! | [`pipeline`] | a pipeline file to a map |
 //! | [`cli`] | the command line |
 
@@ -37,6 +38,8 @@ pub mod fuse;
 pub mod footprint;
 
 pub mod publish;
+
+pub mod evaluate;
 
 pub mod pipeline;
 

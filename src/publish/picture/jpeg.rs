@@ -1,0 +1,202 @@
+//! JPEG by libjpeg-turbo, and the segments around its picture.
+
+use std::io::{BufRead, Cursor, ErrorKind, Read, Seek, SeekFrom};
+
+use turbojpeg::{Compressor, Decompressor, Image, PixelFormat, Subsamp};
+
+use super::{Format, Picture, PictureError, pixel_count};
+
+/// Marker codes of ISO/IEC 10918-1, table B.1.
+const START_OF_SCAN: u8 = 0xda;
+const END_OF_IMAGE: u8 = 0xd9;
+const APP0: u8 = 0xe0;
+const APP1: u8 = 0xe1;
+const APP2: u8 = 0xe2;
+
+/// What libjpeg complains of in files that decode as they should.
+const HARMLESS: [&str; 4] = [
+    "extraneous bytes before marker",
+    "unknown JFIF revision",
+    "Unknown Adobe color transform",
+    "Invalid SOS parameters",
+];
+
+/// Decodes a grey or colour JPEG.
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
+    let (width, height) = size(&mut Cursor::new(bytes))?;
+    let mut rgba = vec![0; pixel_count(width, height)? * 4];
+    let mut decompressor = Decompressor::new().map_err(|e| problem(&e))?;
+    let decoded = decompressor.decompress(
+        bytes,
+        Image {
+            pixels: rgba.as_mut_slice(),
+            width: width as usize,
+            pitch: width as usize * 4,
+            height: height as usize,
+            format: PixelFormat::RGBA,
+        },
+    );
+    match decoded {
+        Err(error) if !is_harmless(&error) => return Err(problem(&error)),
+        _ => {}
+    }
+    let mut picture = Picture::from_parts(width, height, rgba);
+    picture.metadata = metadata(bytes);
+    Ok(picture)
+}
+
+/// Encodes in 4:4:4, with the metadata after the JFIF header.
+pub(super) fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>, String> {
+    let words = |error: turbojpeg::Error| message(&error);
+    let mut compressor = Compressor::new().map_err(words)?;
+    compressor
+        .set_quality(i32::from(quality.clamp(1, 100)))
+        .map_err(words)?;
+    compressor.set_subsamp(Subsamp::None).map_err(words)?;
+    let width = picture.width as usize;
+    let image = Image {
+        pixels: picture.rgba.as_slice(),
+        width,
+        pitch: width * 4,
+        height: picture.height as usize,
+        format: PixelFormat::RGBX,
+    };
+    let plain = compressor.compress_to_owned(image).map_err(words)?;
+    let body = Segments::new(&plain)
+        .take_while(|segment| segment.marker == APP0)
+        .last()
+        .map_or(2, |segment| segment.end);
+    let extra: usize = picture.metadata.iter().map(Vec::len).sum();
+    let mut bytes = Vec::with_capacity(plain.len() + extra);
+    bytes.extend_from_slice(&plain[..body]);
+    for segment in &picture.metadata {
+        bytes.extend_from_slice(segment);
+    }
+    bytes.extend_from_slice(&plain[body..]);
+    Ok(bytes)
+}
+
+/// Columns and rows from the frame header, reading no further.
+pub(super) fn size<R: BufRead + Seek>(file: &mut R) -> Result<(u32, u32), PictureError> {
+    let early = |error: std::io::Error| match error.kind() {
+        ErrorKind::UnexpectedEof => PictureError::EndsEarly(Format::Jpeg),
+        _ => unsound(&error.to_string()),
+    };
+    file.seek(SeekFrom::Start(2)).map_err(early)?;
+    loop {
+        let mut byte = [0];
+        file.read_exact(&mut byte).map_err(early)?;
+        if byte[0] != 0xff {
+            return Err(unsound("a segment without a marker"));
+        }
+        while byte[0] == 0xff {
+            file.read_exact(&mut byte).map_err(early)?;
+        }
+        match byte[0] {
+            // Markers that stand alone.
+            0x01 | 0xd0..=0xd8 => {}
+            // SOF0 to SOF15, without DHT, JPG and DAC, which share their range.
+            0xc0..=0xcf if !matches!(byte[0], 0xc4 | 0xc8 | 0xcc) => {
+                let mut frame = [0; 7];
+                file.read_exact(&mut frame).map_err(early)?;
+                let height = u32::from(u16::from_be_bytes([frame[3], frame[4]]));
+                let width = u32::from(u16::from_be_bytes([frame[5], frame[6]]));
+                return pixel_count(width, height).map(|_| (width, height));
+            }
+            START_OF_SCAN | END_OF_IMAGE => return Err(unsound("no frame header")),
+            _ => {
+                let mut length = [0; 2];
+                file.read_exact(&mut length).map_err(early)?;
+                let content = u64::from(u16::from_be_bytes(length)).saturating_sub(2);
+                let skipped = std::io::copy(&mut file.take(content), &mut std::io::sink());
+                if skipped.map_err(early)? < content {
+                    return Err(PictureError::EndsEarly(Format::Jpeg));
+                }
+            }
+        }
+    }
+}
+
+/// The segments that any copy of the picture should carry, marker and length included.
+fn metadata(bytes: &[u8]) -> Vec<Vec<u8>> {
+    Segments::new(bytes)
+        .filter(|segment| {
+            let content = &bytes[segment.start + 4..segment.end];
+            match segment.marker {
+                APP1 => {
+                    content.starts_with(b"Exif\0") || content.starts_with(b"http://ns.adobe.com/")
+                }
+                APP2 => content.starts_with(b"ICC_PROFILE\0"),
+                _ => false,
+            }
+        })
+        .map(|segment| bytes[segment.start..segment.end].to_vec())
+        .collect()
+}
+
+/// One marker segment: from its 0xff to the end of its content.
+struct Segment {
+    marker: u8,
+    start: usize,
+    end: usize,
+}
+
+/// The segments before the first scan.
+struct Segments<'a> {
+    bytes: &'a [u8],
+    next: usize,
+}
+
+impl<'a> Segments<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, next: 2 }
+    }
+}
+
+impl Iterator for Segments<'_> {
+    type Item = Segment;
+
+    fn next(&mut self) -> Option<Segment> {
+        let mut start = self.next;
+        while self.bytes.get(start..start + 2) == Some(&[0xff, 0xff]) {
+            start += 1; // Fill bytes may precede a marker.
+        }
+        let &[0xff, marker, high, low] = self.bytes.get(start..start + 4)? else {
+            return None;
+        };
+        let end = start + 2 + usize::from(u16::from_be_bytes([high, low]));
+        if marker == START_OF_SCAN || end < start + 4 || end > self.bytes.len() {
+            return None;
+        }
+        self.next = end;
+        Some(Segment { marker, start, end })
+    }
+}
+
+fn message(error: &turbojpeg::Error) -> String {
+    match error {
+        turbojpeg::Error::TurboJpegError(words) => words.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn is_harmless(error: &turbojpeg::Error) -> bool {
+    let words = message(error);
+    HARMLESS.iter().any(|harmless| words.contains(harmless))
+}
+
+fn problem(error: &turbojpeg::Error) -> PictureError {
+    let words = message(error);
+    let ends = ["Premature end", "premature end", "missing SOS"];
+    if ends.iter().any(|end| words.contains(end)) {
+        return PictureError::EndsEarly(Format::Jpeg);
+    }
+    unsound(&words)
+}
+
+fn unsound(why: &str) -> PictureError {
+    PictureError::Unreadable {
+        format: Format::Jpeg,
+        why: why.to_owned(),
+    }
+}
