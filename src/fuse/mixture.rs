@@ -183,10 +183,11 @@ impl Mixture {
         let mut moved: f64 = 0.0;
         let mut kept = vec![true; self.means.len()];
         self.members.clear();
-        for k in 0..self.means.len() {
-            let range = edges.of(k);
-            let members: Vec<(usize, f64)> =
-                range.map(|e| (edges.observation[e], shares[e])).collect();
+        for (k, kept) in kept.iter_mut().enumerate() {
+            let members: Vec<(usize, f64)> = edges
+                .of(k)
+                .map(|e| (edges.observation[e], shares[e]))
+                .collect();
             let weight: f64 = members.iter().map(|&(_, p)| p).sum();
             if weight < VANISHED {
                 *kept = false;
