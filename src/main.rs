@@ -1,2 +1,5 @@
 //! The `rockmap` program.
-fn main() {}
+
+fn main() -> std::process::ExitCode {
+    rockmap::cli::main()
+}

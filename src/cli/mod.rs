@@ -1,0 +1,70 @@
+//! The command line: what was typed, and how a run looks on a terminal. No logic of its own.
+
+mod check;
+mod console;
+mod options;
+mod project;
+mod run;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::error::Error;
+
+/// Maps of rocks from posed pictures: projects every detection onto the terrain, fuses all views
+/// into one map, and draws the fused rocks back into every picture.
+#[derive(Debug, Parser)]
+#[command(name = "rockmap", version, about, max_term_width = 100, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "Examples:
+  rockmap check pipelines/demo.toml              is everything there, and does it fit?
+  rockmap run pipelines/demo.toml                make the map
+  rockmap run night.toml --data /logs/sol-17 --out /maps/sol-17
+  rockmap run night.toml --set view.max_range_m=20 --method em --force
+
+Exit codes: 0 done, 1 done but more records were faulty than the run allows, 2 not done.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Read, project, fuse and publish: the whole job
+    Run(run::Args),
+    /// The same up to the ground: every detection by itself, with footprints and rejects
+    Project(project::Args),
+    /// Validate a pipeline and all its inputs, compute nothing, list all faults at once
+    Check(check::Args),
+}
+
+/// Does what the command line says and tells how it went by the exit code: 0 done, 1 done with more
+/// faulty records than the run allows, 2 not done.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let done = match cli.command {
+        Command::Run(args) => run::run(&args),
+        Command::Project(args) => project::project(&args),
+        Command::Check(args) => check::check(&args),
+    };
+    match done {
+        Ok(code) => code,
+        Err(error) => {
+            tell(&error);
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Prints an error, one line a fault.
+fn tell(error: &Error) {
+    match error {
+        Error::Faults(faults) => {
+            for fault in faults {
+                eprintln!("error: {fault}");
+            }
+        }
+        other => eprintln!("error: {other}"),
+    }
+}

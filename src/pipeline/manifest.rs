@@ -1,0 +1,73 @@
+//! run.json and timing.json: what a run was made from, and what it took.
+
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
+use super::config::Config;
+use super::read::{Inputs, hexadecimal};
+use super::summary::{Stage, Summary};
+use crate::fuse::Fusion;
+
+/// The program's version, part of what a run is.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Names a run by what it is made from: command, version, configuration and content of the inputs.
+pub(super) fn run_id(command: &str, config: &Config, inputs: &Inputs) -> String {
+    let identity = json!({
+        "command": command,
+        "version": VERSION,
+        "config": config,
+        "inputs": inputs.files,
+        "pictures": inputs.pictures,
+    });
+    let digest = Sha256::digest(identity.to_string());
+    hexadecimal(&digest)[..16].to_owned()
+}
+
+/// run.json.
+pub(super) fn run_json(
+    config: &Config,
+    inputs: &Inputs,
+    fusion: Option<&Fusion>,
+    run_id: &str,
+    summary: &Summary,
+) -> String {
+    let origin = inputs.site.origin();
+    let manifest = json!({
+        "run_id": run_id,
+        "program": "rockmap",
+        "version": VERSION,
+        "site": {
+            "body": inputs.site.planet().name,
+            "crs": inputs.site.planet().crs,
+            "origin": {
+                "lat_deg": origin.lat_deg(),
+                "lon_deg": origin.lon_deg(),
+                "height_m": origin.height_m,
+            },
+        },
+        "config": config,
+        "inputs": inputs.files,
+        "pictures": inputs.pictures,
+        "counts": {
+            "files": summary.files,
+            "rejected": summary.rejected(),
+            "views": summary.n_views,
+            "detections_placed": summary.n_placed,
+            "objects": summary.n_objects,
+            "pictures_annotated": summary.n_annotated,
+        },
+        "warnings": summary.warnings,
+        "solver": fusion.map(|f| &f.solver),
+    });
+    pretty(&manifest)
+}
+
+/// timing.json.
+pub(super) fn timing_json(stages: &[Stage], threads: usize) -> String {
+    pretty(&json!({ "threads": threads, "stages": stages }))
+}
+
+fn pretty(value: &Value) -> String {
+    format!("{value:#}\n")
+}

@@ -1,0 +1,75 @@
+//! From a pipeline file to a map.
+//!
+//! The top functions read as the walk of a night's data: [`run`], [`project`] and [`check`].
+
+mod config;
+mod fuse;
+mod manifest;
+mod observer;
+mod paths;
+mod publish;
+mod read;
+mod stages;
+mod summary;
+
+pub use config::{
+    Config, FusionConfig, InputConfig, Method, NoiseConfig, OutputConfig, Overrides, SiteConfig,
+    TerrainConfig, ViewConfig,
+};
+pub use observer::{Observer, Silent};
+pub use paths::{DEFAULT_DATA, Source};
+pub use read::{InputFile, Inputs, PictureDigest, read};
+pub use stages::{Ground, Settings};
+pub use summary::{FileCount, Stage, Summary};
+
+use crate::error::Error;
+use crate::publish::Folder;
+use stages::Clock;
+
+/// The whole job: reads, projects, traces footprints, fuses and publishes.
+///
+/// # Errors
+/// All faults of the inputs at once, or an output that cannot be written; then nothing is.
+pub fn run(config: &Config, force: bool, observer: &dyn Observer) -> Result<Summary, Error> {
+    let folder = Folder::claim(&config.output.dir)?;
+    let mut clock = Clock::start();
+    let inputs = clock.stage("read", || read::read(config, observer))?;
+    let run_id = manifest::run_id("run", config, &inputs);
+    publish::may_replace(&folder, &run_id, force)?;
+    let placed = clock.stage("project", || Ok(stages::project(config, &inputs, observer)))?;
+    let ground = clock.stage("footprint", || {
+        Ok(stages::footprint(config, &inputs, placed, observer))
+    })?;
+    let fusion = clock.stage("fuse", || Ok(fuse::fuse(config, &ground, observer)))?;
+    let map = publish::Map::new(config, &inputs, &ground, &fusion, run_id);
+    let written = clock.stage("publish", || map.write(&folder, observer))?;
+    map.finish(folder, written, clock)
+}
+
+/// The same up to the ground: every detection by itself, with footprints and rejects.
+///
+/// # Errors
+/// As [`run`].
+pub fn project(config: &Config, force: bool, observer: &dyn Observer) -> Result<Summary, Error> {
+    let folder = Folder::claim(&config.output.dir)?;
+    let mut clock = Clock::start();
+    let inputs = clock.stage("read", || read::read(config, observer))?;
+    let run_id = manifest::run_id("project", config, &inputs);
+    publish::may_replace(&folder, &run_id, force)?;
+    let placed = clock.stage("project", || Ok(stages::project(config, &inputs, observer)))?;
+    let ground = clock.stage("footprint", || {
+        Ok(stages::footprint(config, &inputs, placed, observer))
+    })?;
+    let map = publish::Map::single_view(config, &inputs, &ground, run_id);
+    let written = clock.stage("publish", || map.write(&folder, observer))?;
+    map.finish(folder, written, clock)
+}
+
+/// Validates everything and computes nothing: the pipeline file, every input, and how they fit.
+///
+/// # Errors
+/// All faults that would keep the run from starting, at once.
+pub fn check(config: &Config, observer: &dyn Observer) -> Result<Summary, Error> {
+    let inputs = read::read(config, observer)?;
+    Ok(Summary::of_inputs(config, &inputs))
+}

@@ -1,0 +1,217 @@
+//! The stage that publishes.
+
+use std::path::{Component, Path, PathBuf};
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use super::Observer;
+use super::config::Config;
+use super::manifest::{run_json, timing_json};
+use super::read::Inputs;
+use super::stages::{Clock, Ground};
+use super::summary::Summary;
+use crate::error::{Error, Fault, Place};
+use crate::fuse::Fusion;
+use crate::input::Reject;
+use crate::publish::{Folder, Picture, Product, Rock, Scene, annotate, reject_table};
+use crate::view::View;
+
+/// A folder that holds another run is replaced only where that is asked for.
+pub(super) fn may_replace(folder: &Folder, run_id: &str, force: bool) -> Result<(), Error> {
+    match folder.earlier_run() {
+        Some(earlier) if earlier != run_id && !force => {
+            let place = Place::file(folder.target().display().to_string());
+            let found = format!("the outputs of another run, {earlier}");
+            Err(Fault::found(
+                place,
+                "",
+                found,
+                "an empty folder, or --force to replace them",
+            )
+            .into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A finished map on its way to disk.
+pub(super) struct Map<'a> {
+    config: &'a Config,
+    inputs: &'a Inputs,
+    ground: &'a Ground,
+    fusion: Option<&'a Fusion>,
+    scene: Scene<'a>,
+    rocks: Vec<Rock>,
+    run_id: String,
+}
+
+/// What was written so far.
+#[derive(Default)]
+pub(super) struct Written {
+    n_annotated: usize,
+    warnings: Vec<String>,
+}
+
+impl<'a> Map<'a> {
+    /// The fused map.
+    pub(super) fn new(
+        config: &'a Config,
+        inputs: &'a Inputs,
+        ground: &'a Ground,
+        fusion: &'a Fusion,
+        run_id: String,
+    ) -> Self {
+        let mut map = Self::single_view(config, inputs, ground, run_id);
+        map.rocks = map.scene.rock_map(fusion);
+        map.fusion = Some(fusion);
+        map
+    }
+
+    /// The map of every detection by itself.
+    pub(super) fn single_view(
+        config: &'a Config,
+        inputs: &'a Inputs,
+        ground: &'a Ground,
+        run_id: String,
+    ) -> Self {
+        Self {
+            config,
+            inputs,
+            ground,
+            fusion: None,
+            scene: Scene {
+                site: &inputs.site,
+                terrain: inputs.terrain.as_ref(),
+                views: &inputs.views,
+                detections: &inputs.detections,
+                placed: &ground.placed,
+                footprints: &ground.footprints,
+                classes: &ground.classes,
+                aim: config.view.aim,
+            },
+            rocks: Vec::new(),
+            run_id,
+        }
+    }
+
+    /// Writes maps, tables and pictures into the folder in the making.
+    pub(super) fn write(&self, folder: &Folder, observer: &dyn Observer) -> Result<Written, Error> {
+        let pictures = self.pictures();
+        observer.begin("publish", Some(pictures.len()));
+        for product in self.products()? {
+            folder.write(&product)?;
+        }
+        let warnings = Mutex::new(Vec::new());
+        let drawn: Vec<bool> = pictures
+            .par_iter()
+            .map(|&(view, picture)| {
+                let drawn = self.annotate(folder, view, picture, &warnings);
+                observer.step();
+                drawn
+            })
+            .collect::<Result<_, Error>>()?;
+        let mut warnings: Vec<String> = warnings.into_inner().unwrap_or_default();
+        warnings.sort();
+        let n_annotated = drawn.iter().filter(|d| **d).count();
+        observer.end(&format!("{n_annotated} pictures annotated"));
+        Ok(Written {
+            n_annotated,
+            warnings,
+        })
+    }
+
+    fn products(&self) -> Result<Vec<Product>, Error> {
+        let mut products = Vec::new();
+        if self.fusion.is_some() {
+            let site_name = &self.config.site.name;
+            products.extend(self.scene.map(&self.rocks, &self.run_id, site_name)?);
+        } else {
+            products.extend([self.scene.footprint_map(), self.scene.view_map()]);
+        }
+        if self.fusion.is_none() || self.config.output.detections {
+            products.push(self.scene.single_view_map(&self.rocks));
+        }
+        Ok(products)
+    }
+
+    /// The views whose pictures are drawn, each with its picture.
+    fn pictures(&self) -> Vec<(usize, &View)> {
+        let wanted = self.fusion.is_some() && self.config.output.annotate;
+        let views = self.inputs.views.iter().enumerate();
+        views
+            .filter(|(_, view)| wanted && view.picture.is_some() && view.camera.is_some())
+            .collect()
+    }
+
+    /// Draws one picture; one that cannot be decoded costs a warning.
+    fn annotate(
+        &self,
+        folder: &Folder,
+        index: usize,
+        view: &View,
+        warnings: &Mutex<Vec<String>>,
+    ) -> Result<bool, Error> {
+        let Some(source) = &view.picture else {
+            return Ok(false);
+        };
+        let mut picture = match Picture::read(&source.path, &source.name) {
+            Ok(picture) => picture,
+            Err(error) => {
+                if let Ok(mut warnings) = warnings.lock() {
+                    warnings.push(format!("image {}: {error}", view.image_id));
+                }
+                return Ok(false);
+            }
+        };
+        annotate(&mut picture, &self.scene.annotation_of(index, &self.rocks));
+        let path = folder.path_of(&Path::new("annotated").join(tame(&source.name)))?;
+        picture.write(&path, Picture::JPEG_QUALITY)?;
+        Ok(true)
+    }
+
+    /// Writes what is said of the run itself and puts the folder in its place.
+    pub(super) fn finish(
+        self,
+        folder: Folder,
+        written: Written,
+        clock: Clock,
+    ) -> Result<Summary, Error> {
+        let rejects: Vec<Reject> = [
+            self.inputs.rejects.as_slice(),
+            self.ground.misses.as_slice(),
+        ]
+        .concat();
+        let mut summary = Summary::new(self.config, self.inputs, rejects);
+        summary.n_placed = self.ground.placed.len();
+        summary.n_objects = self.fusion.map(|_| self.rocks.len());
+        summary.n_annotated = written.n_annotated;
+        summary.warnings.extend(written.warnings);
+        folder.write(&reject_table(&summary.rejects)?)?;
+        let manifest = run_json(
+            self.config,
+            self.inputs,
+            self.fusion,
+            &self.run_id,
+            &summary,
+        );
+        folder.write(&Product::new("run.json", manifest))?;
+        let timing = timing_json(&clock.stages, rayon::current_num_threads());
+        folder.write(&Product::new("timing.json", timing))?;
+        summary.stages = clock.stages;
+        summary.run_id = Some(self.run_id);
+        summary.folder = Some(folder.publish()?);
+        Ok(summary)
+    }
+}
+
+/// A picture's name as a path that stays below the folder it is written to.
+fn tame(name: &str) -> PathBuf {
+    let parts = Path::new(name).components();
+    parts
+        .filter_map(|part| match part {
+            Component::Normal(part) => Some(part),
+            _ => None,
+        })
+        .collect()
+}
