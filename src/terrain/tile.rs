@@ -106,7 +106,6 @@ impl Tile {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
         reason = "the position is checked to lie on the raster"
     )]
     pub fn cell(&self, position: [f64; 2]) -> Option<[usize; 2]> {
@@ -186,7 +185,6 @@ impl Tile {
     }
 
     /// An upper bound, by samples, of the second derivative of column and row along straight lines.
-    #[expect(clippy::cast_precision_loss, reason = "rasters have under 2^53 posts")]
     fn greatest_bend(&self, site: &Site) -> f64 {
         const STEP_M: f64 = 100.0;
         let radius = site.planet().ellipsoid.a;
