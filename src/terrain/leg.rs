@@ -172,6 +172,15 @@ impl Blocks {
 mod tests {
     use super::*;
 
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the line lies among positive columns and rows"
+    )]
+    fn whole(position: f64) -> usize {
+        position as usize
+    }
+
     #[test]
     fn every_cell_on_the_way_is_visited_once() {
         let line = Line {
@@ -186,7 +195,7 @@ mod tests {
         }
         let mut expected: Vec<[usize; 2]> = (0..100_000u32)
             .map(|i| line.at(f64::from(i) / 1e5))
-            .map(|[x, y]| [x as usize, y as usize])
+            .map(|place| place.map(whole))
             .collect();
         expected.dedup();
         assert_eq!(cells, expected);

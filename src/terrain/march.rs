@@ -63,7 +63,12 @@ pub(super) struct Over<'l> {
 }
 
 /// The first hit of a ray within a horizontal distance: how far along the ray.
-pub(super) fn first_hit(site: &Site, model: &Model, ray: Ray<Enu>, max_ground_range_m: f64) -> Found {
+pub(super) fn first_hit(
+    site: &Site,
+    model: &Model,
+    ray: Ray<Enu>,
+    max_ground_range_m: f64,
+) -> Found {
     let mut march = March {
         site,
         model,
@@ -153,7 +158,11 @@ impl March<'_> {
     fn after(&self, from: f64, far: f64) -> Miss {
         if self.passed == Passed::Unknown {
             let rises = self.slope(self.site.geodetic(self.ray.at(from))) >= 0.0;
-            return if rises { Miss::AboveHorizon } else { Miss::OffTerrain };
+            return if rises {
+                Miss::AboveHorizon
+            } else {
+                Miss::OffTerrain
+            };
         }
         let (outside_m, top_m) = (self.model.outside_m, self.model.top_m);
         let highest_m = outside_m.filter(|_| from < far).unwrap_or(top_m);
@@ -197,7 +206,13 @@ impl March<'_> {
 
     /// A stretch over a raster and whatever lies around it.
     pub fn scan(&mut self, over: Over<'_>) -> ControlFlow<Found> {
-        let Over { leg, number, s0, s1, .. } = over;
+        let Over {
+            leg,
+            number,
+            s0,
+            s1,
+            ..
+        } = over;
         if s1 <= s0 {
             return Continue(());
         }
