@@ -2,6 +2,7 @@
 
 mod check;
 mod console;
+mod evaluate;
 mod options;
 mod project;
 mod run;
@@ -37,6 +38,8 @@ enum Command {
     Project(project::Args),
     /// Validate a pipeline and all its inputs, compute nothing, list all faults at once
     Check(check::Args),
+    /// Hold a map against the truth: precision, recall, GOSPA, calibration
+    Evaluate(evaluate::Args),
 }
 
 /// Does what the command line says and tells how it went by the exit code: 0 done, 1 done with more
@@ -47,6 +50,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Project(args) => project::project(&args),
         Command::Check(args) => check::check(&args),
+        Command::Evaluate(args) => evaluate::evaluate(&args),
     };
     match done {
         Ok(code) => code,
