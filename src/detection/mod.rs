@@ -1,0 +1,5 @@
+//! Detector outputs.
+
+mod writer;
+
+pub use writer::{DetectionRecord, MeasurementRecord, write_detections};
