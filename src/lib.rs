@@ -1,5 +1,6 @@
 //! rockmap: maps of rocks from posed pictures.
 
+pub mod camera;
 pub mod detection;
 pub mod error;
 pub mod frame;

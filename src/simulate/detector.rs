@@ -7,11 +7,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson};
 use rayon::prelude::*;
 
+use crate::camera::Camera;
 use crate::frame::{self, Enu, Pixel, Point, RigidTransform};
 
 use super::field::Field;
 use super::ground::Ground;
-use super::lens_shim::Camera;
 use super::random::{Purpose, normal, stream, uniform};
 use super::rocks::Rock;
 use super::scene::{Border, Detector, Scene, ScoreLaw};

@@ -9,7 +9,6 @@ mod detector;
 mod diameters;
 mod field;
 mod ground;
-mod lens_shim;
 mod noise;
 mod random;
 mod rocks;

@@ -1,9 +1,9 @@
 //! What a scene is made of.
 
+use crate::camera::Camera;
 use crate::frame::Site;
 use crate::pose::PoseSigma;
 
-use super::lens_shim::Camera;
 
 use super::diameters::DiameterLaw;
 

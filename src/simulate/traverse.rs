@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, Vector3, Vector6};
 use rand_chacha::ChaCha8Rng;
 
+use crate::camera::PanTilt;
 use crate::frame::{self, Body, Enu, Point, RigidTransform, Rotation, Vector};
 
 use super::ground::Ground;
-use super::lens_shim::PanTilt;
 use super::random::{Purpose, normal, stream};
 use super::scene::{Path, Platform, PoseKey, PosePlan, Scene};
 

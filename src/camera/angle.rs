@@ -1,0 +1,70 @@
+//! Directions as vectors whose length is the angle from the optical axis.
+//!
+//! A direction at the angle `theta` from z is `theta` times the unit vector of its part across z,
+//! which, unlike the plane at unit depth, reaches past 90 degrees.
+
+use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
+
+use super::LensError;
+use super::perspective::radial_jacobian;
+
+/// The angle vector of the direction to `point`, radians, and its derivative by the point.
+///
+/// # Errors
+/// [`LensError::BehindCamera`] straight behind the camera, where the azimuth is undefined.
+#[inline]
+pub(super) fn angle_of_point(
+    point: Vector3<f64>,
+) -> Result<(Vector2<f64>, Matrix2x3<f64>), LensError> {
+    let across = point.xy().norm();
+    let squared = point.norm_squared();
+    if !(squared > 0.0 && squared.is_finite()) || (across == 0.0 && point.z < 0.0) {
+        return Err(LensError::BehindCamera);
+    }
+    if across == 0.0 {
+        let inverse = 1.0 / point.z;
+        let jacobian = Matrix2x3::new(inverse, 0.0, 0.0, 0.0, inverse, 0.0);
+        return Ok((Vector2::zeros(), jacobian));
+    }
+    let unit = point.xy() / across;
+    let theta = across.atan2(point.z);
+    let jacobian = angle_jacobian(unit, point.z / squared, theta / across, -across / squared);
+    Ok((unit * theta, jacobian))
+}
+
+/// The derivative of an angle vector `theta * unit` by a point whose part across z has the direction
+/// `unit`: `by_across` and `by_depth` are the derivatives of theta by the point's distance from the
+/// axis and by its depth, `ratio` is theta over that distance.
+#[inline]
+pub(super) fn angle_jacobian(
+    unit: Vector2<f64>,
+    by_across: f64,
+    ratio: f64,
+    by_depth: f64,
+) -> Matrix2x3<f64> {
+    let plane = radial_jacobian(unit, by_across, ratio);
+    let depth = unit * by_depth;
+    Matrix2x3::from_columns(&[plane.column(0).into(), plane.column(1).into(), depth])
+}
+
+/// The unit direction of an angle vector, and its derivative by that vector.
+#[inline]
+pub(super) fn direction_of_angle(angle: Vector2<f64>) -> (Vector3<f64>, Matrix3x2<f64>) {
+    let theta = angle.norm();
+    if theta == 0.0 {
+        return (Vector3::z(), Matrix3x2::identity());
+    }
+    let unit = angle / theta;
+    let (sin, cos) = theta.sin_cos();
+    let plane = radial_jacobian(unit, cos, sin / theta);
+    let direction = Vector3::new(unit.x * sin, unit.y * sin, cos);
+    let jacobian = Matrix3x2::new(
+        plane.m11,
+        plane.m12,
+        plane.m21,
+        plane.m22,
+        -sin * unit.x,
+        -sin * unit.y,
+    );
+    (direction, jacobian)
+}

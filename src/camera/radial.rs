@@ -1,0 +1,204 @@
+//! Distortion along the radius alone, and its inverse.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::LensError;
+use super::polynomial::{derivative, difference, evaluate, first_positive_root, product};
+
+/// `r_d = r N(r^2) / D(r^2)`: the radial part of every lens model here.
+///
+/// It is used up to the smallest radius at which `r_d` stops growing (or the denominator vanishes):
+/// beyond it a point outside the field would fold back into the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Radial {
+    numerator: [f64; 5],
+    denominator: [f64; 4],
+    /// Radius up to which the map is one to one; infinite where it always is.
+    limit: f64,
+    /// The distorted radius at the limit.
+    distorted_limit: f64,
+}
+
+impl Radial {
+    /// From the coefficients of N and D in powers of `r^2`; `None` where the distorted radius does
+    /// not grow with the radius at the centre, or a coefficient is not finite.
+    pub(super) fn new(numerator: [f64; 5], denominator: [f64; 4]) -> Option<Self> {
+        let all = || numerator.iter().chain(&denominator);
+        if !all().all(|c| c.is_finite()) || numerator[0] <= 0.0 || denominator[0] <= 0.0 {
+            return None;
+        }
+        let s = [0.0, 2.0];
+        // d r_d / dr = ((N + 2 s N') D - 2 s N D') / D^2 with s = r^2
+        let n_slope = product(&s, &derivative(&numerator));
+        let d_slope = product(&s, &derivative(&denominator));
+        let grown = difference(&numerator, &difference(&[], &n_slope));
+        let growth = difference(
+            &product(&grown, &denominator),
+            &product(&numerator, &d_slope),
+        );
+        let turning = first_positive_root(&growth);
+        let pole = first_positive_root(&denominator);
+        let limit = [turning, pole]
+            .into_iter()
+            .flatten()
+            .fold(f64::INFINITY, f64::min);
+        Some(
+            Self {
+                numerator,
+                denominator,
+                limit: f64::INFINITY,
+                distorted_limit: f64::INFINITY,
+            }
+            .limited(limit.sqrt()),
+        )
+    }
+
+    /// The same map, used up to `limit` at most.
+    pub(super) fn limited(mut self, limit: f64) -> Self {
+        if limit < self.limit {
+            self.limit = limit;
+            let (factor, _) = self.factor(limit * limit);
+            // At a pole of the denominator the distorted radius grows without bound.
+            self.distorted_limit = if factor > 0.0 {
+                limit * factor
+            } else {
+                f64::INFINITY
+            };
+        }
+        self
+    }
+
+    /// The radius up to which the map is one to one.
+    pub(super) fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    /// `N / D` and its derivative by `s = r^2`.
+    #[inline]
+    pub(super) fn factor(&self, s: f64) -> (f64, f64) {
+        let (n, n_slope) = evaluate(&self.numerator, s);
+        let (d, d_slope) = evaluate(&self.denominator, s);
+        let factor = n / d;
+        (factor, (n_slope - factor * d_slope) / d)
+    }
+
+    /// The distorted place of a place, and its derivative.
+    ///
+    /// # Errors
+    /// [`LensError::OutsideField`] beyond the radius of use.
+    #[inline]
+    pub(super) fn distort(
+        &self,
+        place: Vector2<f64>,
+    ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
+        let s = place.norm_squared();
+        let inside = s < self.limit * self.limit;
+        if !inside {
+            return Err(LensError::OutsideField);
+        }
+        let (factor, slope) = self.factor(s);
+        let jacobian =
+            Matrix2::from_diagonal_element(factor) + place * place.transpose() * (2.0 * slope);
+        Ok((place * factor, jacobian))
+    }
+
+    /// The place whose distorted place is given, and its derivative.
+    ///
+    /// # Errors
+    /// [`LensError::OutsideField`] where no place within the radius of use is distorted to it.
+    #[inline]
+    pub(super) fn undistort(
+        &self,
+        distorted: Vector2<f64>,
+    ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
+        let distorted_radius = distorted.norm();
+        let radius = self.radius(distorted_radius)?;
+        let (factor, slope) = self.factor(radius * radius);
+        let growth = factor + 2.0 * radius * radius * slope;
+        if growth <= 0.0 {
+            return Err(LensError::OutsideField);
+        }
+        let unit = if distorted_radius > 0.0 {
+            distorted / distorted_radius
+        } else {
+            Vector2::x()
+        };
+        let jacobian = super::perspective::radial_jacobian(unit, 1.0 / growth, 1.0 / factor);
+        Ok((unit * radius, jacobian))
+    }
+
+    /// The radius that is distorted to `distorted`.
+    ///
+    /// # Errors
+    /// [`LensError::OutsideField`] beyond the largest distorted radius, [`LensError::NoConvergence`]
+    /// where Newton's method does not end, which its bracket rules out for finite input.
+    #[inline]
+    pub(super) fn radius(&self, distorted: f64) -> Result<f64, LensError> {
+        if distorted == 0.0 {
+            return Ok(0.0);
+        }
+        let reached = distorted < self.distorted_limit;
+        if !reached {
+            return Err(LensError::OutsideField);
+        }
+        let excess = |r: f64| {
+            let s = r * r;
+            let (factor, slope) = self.factor(s);
+            (r * factor - distorted, factor + 2.0 * s * slope)
+        };
+        let high = self
+            .radius_beyond(distorted)
+            .ok_or(LensError::OutsideField)?;
+        increasing_root(excess, high, distorted, 4.0 * f64::EPSILON * distorted)
+            .ok_or(LensError::NoConvergence)
+    }
+
+    /// A radius that is distorted to more than `distorted`; `None` where the map never gets there.
+    fn radius_beyond(&self, distorted: f64) -> Option<f64> {
+        if self.limit.is_finite() {
+            return Some(self.limit);
+        }
+        let mut radius = 2.0 * distorted.max(1.0);
+        while radius < 1e12 {
+            if radius * self.factor(radius * radius).0 > distorted {
+                return Some(radius);
+            }
+            radius *= 16.0;
+        }
+        None
+    }
+}
+
+/// The root in [0, `high`] of an increasing function that gives its value and slope, by Newton's
+/// method kept within a bracket that shrinks at every step; `None` where 200 steps do not suffice.
+pub(super) fn increasing_root(
+    f: impl Fn(f64) -> (f64, f64),
+    high: f64,
+    start: f64,
+    tolerance: f64,
+) -> Option<f64> {
+    let (mut low, mut high) = (0.0, high);
+    let mut x = if start < high { start } else { 0.5 * high };
+    let mut last_step = high;
+    for _ in 0..200 {
+        let (value, slope) = f(x);
+        if value.abs() <= tolerance {
+            return Some(x);
+        }
+        if value > 0.0 {
+            high = x;
+        } else {
+            low = x;
+        }
+        let newton = x - value / slope;
+        // A Newton step that leaves the bracket, or does not shrink, gives way to bisection.
+        let trusted = newton > low && newton < high && (newton - x).abs() < 0.75 * last_step;
+        let next = if trusted { newton } else { 0.5 * (low + high) };
+        last_step = (next - x).abs();
+        if last_step <= f64::EPSILON * next {
+            return Some(next);
+        }
+        x = next;
+    }
+    None
+}

@@ -1,0 +1,3 @@
+//! The lens models against other implementations, against their own derivatives, and there and back.
+
+mod tables;
