@@ -1,7 +1,5 @@
 //! What the detector makes of each image.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson};
@@ -81,7 +79,7 @@ pub(super) fn detect(
     rocks: &[Rock],
     views: &[View],
 ) -> (Vec<SimulatedDetection>, Vec<usize>) {
-    let field = Field::new(rocks, ground);
+    let field = Field::new(rocks);
     let per_view: Vec<(Vec<SimulatedDetection>, Vec<usize>)> = (0..views.len())
         .into_par_iter()
         .map(|view| detect_in(scene, ground, &field, view, &views[view]))
@@ -269,13 +267,4 @@ fn bordered(
             (x_max > x_min && y_max > y_min).then_some(found)
         }
     }
-}
-
-/// How often each rock was detected.
-pub(super) fn counts(detections: &[SimulatedDetection]) -> BTreeMap<usize, usize> {
-    let mut counts = BTreeMap::new();
-    for rock in detections.iter().filter_map(|d| d.rock) {
-        *counts.entry(rock).or_insert(0) += 1;
-    }
-    counts
 }

@@ -23,6 +23,10 @@ pub struct Field<'a> {
     lowest_m: f64,
 }
 
+/// Rocks count as members of cells this many times their radius away, for the shade they cast on
+/// the ground around them.
+pub(super) const SHADE_REACH: f64 = 1.6;
+
 /// Where a ray meets a rock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RockHit {
@@ -35,8 +39,8 @@ pub struct RockHit {
 }
 
 impl<'a> Field<'a> {
-    /// The field of rocks on a ground.
-    pub(super) fn new(rocks: &'a [Rock], _ground: &Ground) -> Self {
+    /// The field of some rocks.
+    pub fn new(rocks: &'a [Rock]) -> Self {
         let bound = |f: fn(&Rock) -> f64, pick: fn(f64, f64) -> f64, start: f64| {
             rocks.iter().map(f).fold(start, pick)
         };
@@ -85,7 +89,7 @@ impl<'a> Field<'a> {
     fn fill(&mut self) {
         let mut cells: Vec<Vec<usize>> = vec![Vec::new(); self.columns * self.rows];
         for (i, rock) in self.rocks.iter().enumerate() {
-            let reach = rock.diameter_m * rock.shape.half_axes.xy().max();
+            let reach = rock.diameter_m * rock.shape.half_axes.xy().max() * SHADE_REACH;
             let p = rock.place.xyz;
             let (c0, c1) = (
                 self.column(p.x - reach),

@@ -125,16 +125,14 @@ impl Ground {
                 return None;
             }
             gap = above(t);
-            if gap <= 1e-7 {
+            if gap.abs() <= 1e-8 {
+                return Some(t);
+            }
+            if gap <= 0.0 {
                 return Some(bisect(above, previous, t));
             }
         }
         None
-    }
-
-    /// The lowest and highest the ground may deviate from its sloped plane, metres.
-    pub(super) fn bound_m(&self) -> f64 {
-        self.rough.bound_m()
     }
 }
 

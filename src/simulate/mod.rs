@@ -10,11 +10,15 @@ mod diameters;
 mod field;
 mod ground;
 mod noise;
+mod output;
+mod pipeline_file;
 mod random;
+mod render;
 mod rocks;
 mod scene;
 mod scene_cameras;
 mod scene_file;
+mod terrain_file;
 mod traverse;
 
 pub use detector::{Appearance, SimulatedDetection, appearance};
@@ -22,6 +26,8 @@ pub use diameters::{DiameterLaw, golombek_rapp_coverage};
 pub use field::{Field, RockHit};
 pub use ground::Ground;
 pub use noise::SmoothSurface;
+pub use output::{NO_OBJECT, write};
+pub use render::{Picture, render, write_picture};
 pub use rocks::{Rock, Shape};
 pub use scene::{
     Area, Border, Clusters, Detector, GroundPlan, Occlusion, Palette, Path, PictureFormat,
@@ -44,6 +50,17 @@ pub struct Simulation {
     pub detections: Vec<SimulatedDetection>,
     /// Of each rock: in how many images and within whose range its ground point lies.
     pub n_visible: Vec<usize>,
+}
+
+impl Simulation {
+    /// How often each rock was detected.
+    pub fn n_detections(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.rocks.len()];
+        for rock in self.detections.iter().filter_map(|d| d.rock) {
+            counts[rock] += 1;
+        }
+        counts
+    }
 }
 
 /// Plays a scene.

@@ -4,7 +4,6 @@ use crate::camera::Camera;
 use crate::frame::Site;
 use crate::pose::PoseSigma;
 
-
 use super::diameters::DiameterLaw;
 
 /// Everything a simulation depends on: the same scene gives the same bytes.

@@ -36,7 +36,9 @@ pub(super) fn cameras(section: &Section) -> Vec<Camera> {
 fn short(name: &str, section: Section) -> Camera {
     let pixels = |key, default: u32| {
         let number = section.integer(key, 16..=16384);
-        number.and_then(|n| u32::try_from(n).ok()).unwrap_or(default)
+        number
+            .and_then(|n| u32::try_from(n).ok())
+            .unwrap_or(default)
     };
     let (width, height) = (pixels("width", 1280), pixels("height", 960));
     let hfov = section
@@ -75,9 +77,7 @@ fn lens(section: &Section, intrinsics: Intrinsics) -> Lens {
     let model = section.word("model", &["pinhole", "brown_conrady", "fisheye"]);
     let distortion = section.number_list("distortion").unwrap_or_default();
     let made = match model.as_deref() {
-        Some("brown_conrady") => {
-            BrownConrady::new(intrinsics, &distortion).map(Lens::BrownConrady)
-        }
+        Some("brown_conrady") => BrownConrady::new(intrinsics, &distortion).map(Lens::BrownConrady),
         Some("fisheye") => match <[f64; 4]>::try_from(distortion) {
             Ok(distortion) => Fisheye::new(intrinsics, distortion).map(Lens::Fisheye),
             Err(other) => Err(BadLens::Count(other.len())),

@@ -73,12 +73,14 @@ fn platform_views(scene: &Scene, ground: &Ground, index: usize, platform: &Platf
         #[expect(clippy::cast_precision_loss, reason = "far fewer stations than 2^53")]
         let mut time_s = platform.start_s + platform.station_s * station as f64;
         for &pan in &platform.pans {
+            let (head, body_left) = match scene.poses.key {
+                PoseKey::Image => (PanTilt::default(), left - pan),
+                PoseKey::Time => (PanTilt { pan, tilt: 0.0 }, left),
+            };
+            let enu_from_body = stand(platform, ground, place, body_left);
+            // The cameras of a platform take their pictures at once: their pose is one.
+            let measured = errors.measure(&enu_from_body);
             for &camera in &platform.cameras {
-                let (head, body_left) = match scene.poses.key {
-                    PoseKey::Image => (PanTilt::default(), left - pan),
-                    PoseKey::Time => (PanTilt { pan, tilt: 0.0 }, left),
-                };
-                let enu_from_body = stand(platform, ground, place, body_left);
                 views.push(View {
                     image_id: format!("{}_{:04}", platform.name, views.len()),
                     platform: index,
@@ -86,7 +88,7 @@ fn platform_views(scene: &Scene, ground: &Ground, index: usize, platform: &Platf
                     station,
                     time_s,
                     head,
-                    measured: errors.measure(&enu_from_body),
+                    measured,
                     enu_from_body,
                 });
             }
