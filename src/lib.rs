@@ -7,3 +7,4 @@ pub mod frame;
 pub mod input;
 pub mod pose;
 pub mod simulate;
+pub mod terrain;

@@ -1,8 +1,10 @@
 //! The tangent plane everything is fused in, tied to its planet.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::{Ecef, Enu, Geodetic, LocalEnu, Planet, Point, RigidTransform, Rotation};
+use super::{
+    Direction, Ecef, Enu, Geodetic, LocalEnu, Planet, Point, RigidTransform, Rotation,
+};
 
 /// A site: a planet and the origin of the local east-north-up frame on it.
 ///
@@ -56,6 +58,14 @@ impl Site {
     /// Height above the ellipsoid of a place in the site's ENU, metres.
     pub fn height_m(&self, place: Point<Enu>) -> f64 {
         self.geodetic(place).height_m
+    }
+
+    /// The vertical at `place`, the ellipsoid's normal, in the site's ENU.
+    pub fn up(&self, place: Geodetic) -> Direction<Enu> {
+        let (sin_lat, cos_lat) = place.lat.sin_cos();
+        let (sin_lon, cos_lon) = place.lon.sin_cos();
+        let up = Vector3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat);
+        self.ecef_from_enu.rotation.inverse() * Direction::<Ecef>::from_unit(up)
     }
 
     /// Turns the east-north-up axes at `place` into the site's.
@@ -123,5 +133,7 @@ mod tests {
         let north = site.enu_from_local(place) * Vector::<LocalEnu>::new(0.0, 1.0, 0.0);
         let azimuth = north.xyz.x.atan2(north.xyz.y);
         assert!((azimuth + 0.01 * 60f64.to_radians().sin()).abs() < 1e-6);
+        let up = site.enu_from_local(place) * Vector::<LocalEnu>::new(0.0, 0.0, 1.0);
+        assert!((site.up(place).xyz() - up.xyz).norm() < 1e-15);
     }
 }

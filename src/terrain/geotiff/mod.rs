@@ -1,0 +1,9 @@
+//! Height models in GeoTIFF files (OGC GeoTIFF 1.1, and GDAL's tags for nodata and scale).
+
+mod keys;
+mod projection;
+mod read;
+mod write;
+
+pub use read::read_geotiff;
+pub use write::write_geotiff;
