@@ -96,10 +96,10 @@ impl Ground {
     }
 
     /// The distance along a ray at which it first meets the true ground, metres; `None` where it
-    /// does not within `reach_m`.
+    /// does not within `reach_m`, or starts below the ground.
     ///
     /// Sphere tracing against the steepest slope the ground can have, so that nothing is stepped
-    /// over.
+    /// over, from where the ray comes as low as the ground can be high; Newton's method at the end.
     pub(super) fn first_hit_m(&self, ray: Ray<Enu>, reach_m: f64) -> Option<f64> {
         let above = |t: f64| {
             let p = ray.at(t).xyz;
@@ -112,29 +112,69 @@ impl Ground {
             + bend * (reach_m + ray.origin.xyz.xy().norm());
         // How fast the gap may close along the ray.
         let closing = d.xy().norm() * steepest - d.z;
-        let mut t = 0.0;
-        let mut gap = above(t);
-        if gap <= 0.0 || closing <= 0.0 {
+        if above(0.0) <= 0.0 || closing <= 0.0 {
             return None;
         }
+        let mut t = self.lowest_m(ray)?;
+        let mut previous = 0.0;
         for _ in 0..4096 {
-            let previous = t;
-            // At least a millimetre on, so that grazing rays arrive.
-            t += (gap / closing).max(1e-3);
             if t > reach_m {
                 return None;
             }
-            gap = above(t);
-            if gap.abs() <= 1e-8 {
-                return Some(t);
-            }
+            let gap = above(t);
             if gap <= 0.0 {
                 return Some(bisect(above, previous, t));
+            }
+            if gap < NEAR_M
+                && let Some(hit) = self.newton(ray, t, gap)
+            {
+                return (hit <= reach_m).then_some(hit);
+            }
+            previous = t;
+            // At least a millimetre on, so that grazing rays arrive.
+            t += (gap / closing).max(1e-3);
+        }
+        None
+    }
+
+    /// The distance at which a ray comes as low as the ground may be high; `None` where it never
+    /// does. The ellipsoid only falls away below its tangent plane.
+    fn lowest_m(&self, ray: Ray<Enu>) -> Option<f64> {
+        let (o, d) = (ray.origin.xyz, ray.direction.xyz());
+        let plane = self.base_m - self.origin_m + self.slope[0] * o.x + self.slope[1] * o.y;
+        let gap = o.z - plane - self.rough.bound_m();
+        let closing = self.slope[0] * d.x + self.slope[1] * d.y - d.z;
+        match (gap > 0.0, closing > 0.0) {
+            (false, _) => Some(0.0),
+            (true, true) => Some(gap / closing),
+            (true, false) => None,
+        }
+    }
+
+    /// The hit near a point of the ray closely above the ground; `None` where the ray runs along it.
+    fn newton(&self, ray: Ray<Enu>, start: f64, gap: f64) -> Option<f64> {
+        let d = ray.direction.xyz();
+        let (mut t, mut gap) = (start, gap);
+        for _ in 0..6 {
+            let p = ray.at(t).xyz;
+            let slope = self.slope_at(p.x, p.y);
+            let rate = d.z - slope[0] * d.x - slope[1] * d.y;
+            if rate > -0.01 {
+                return None;
+            }
+            t -= gap / rate;
+            let p = ray.at(t).xyz;
+            gap = p.z - self.up_m(p.x, p.y);
+            if gap.abs() < 1e-8 {
+                return Some(t);
             }
         }
         None
     }
 }
+
+/// How near the ground Newton's method takes over, metres: less than its finest undulations rise.
+const NEAR_M: f64 = 0.003;
 
 /// Where `above` changes sign between `low` (above) and `high` (at or below), to 1e-9 m.
 fn bisect(above: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {

@@ -68,6 +68,11 @@ impl SmoothSurface {
         (height, slope)
     }
 
+    /// No height is farther from zero than this, metres.
+    pub(super) fn bound_m(&self) -> f64 {
+        self.amplitude_m * OCTAVES.iter().map(|(_, a)| a).sum::<f64>()
+    }
+
     /// No slope is steeper than this: the quintic rises by at most 15/8 a cell.
     pub(super) fn slope_bound(&self) -> f64 {
         let steepest: f64 = OCTAVES.iter().map(|(f, a)| f * a).sum();
@@ -88,6 +93,7 @@ mod tests {
             for j in 0..400 {
                 let (h, slope) = surface.at(f64::from(i) * 1.37, f64::from(j) * 1.31);
                 square += h * h / 160_000.0;
+                assert!(h.abs() <= surface.bound_m());
                 assert!(slope[0].hypot(slope[1]) <= surface.slope_bound());
             }
         }

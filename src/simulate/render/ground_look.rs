@@ -23,11 +23,11 @@ const RELIEF: [(f64, f64); 6] = [
 
 /// Stains and grains: scale in metres, depth of the change of brightness.
 const STAINS: [(f64, f64); 5] = [
-    (0.8, 0.06),
-    (0.23, 0.07),
-    (0.06, 0.08),
-    (0.02, 0.10),
-    (0.007, 0.12),
+    (0.8, 0.08),
+    (0.23, 0.10),
+    (0.06, 0.12),
+    (0.02, 0.14),
+    (0.007, 0.16),
 ];
 
 /// The look of a place whose large-scale slope is given. Detail finer than twice `sharpness_m` fades
