@@ -296,7 +296,13 @@ fn meet(rock: &Rock, ray: Ray<Enu>) -> Option<(f64, Vector3<f64>)> {
     let scale = rock.diameter_m;
     let o = (ray.origin.xyz - rock.place.xyz) / scale;
     let d = ray.direction.xyz();
-    let (mut enter, mut leave, mut normal) = ellipsoid_span(shape.half_axes, shape.turn, o, d)?;
+    // Most rays miss the sphere around the body.
+    let reach = shape.half_axes.max();
+    let along = o.dot(&d);
+    if o.norm_squared() - along * along > reach * reach {
+        return None;
+    }
+    let (mut enter, mut leave, mut normal) = ellipsoid_span(shape.half_axes, shape.long_axis, o, d)?;
     for &(n, distance) in &shape.facets {
         let toward = n.dot(&d);
         let gap = distance - n.dot(&o);
@@ -323,11 +329,10 @@ fn meet(rock: &Rock, ray: Ray<Enu>) -> Option<(f64, Vector3<f64>)> {
 /// The span of a ray in an ellipsoid and the normal where it enters.
 fn ellipsoid_span(
     half_axes: Vector3<f64>,
-    turn: f64,
+    [cos, sin]: [f64; 2],
     o: Vector3<f64>,
     d: Vector3<f64>,
 ) -> Option<(f64, f64, Vector3<f64>)> {
-    let (sin, cos) = turn.sin_cos();
     let to_axes = |v: Vector3<f64>| {
         Vector3::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin, v.z).component_div(&half_axes)
     };

@@ -1,6 +1,6 @@
 //! Smooth random surfaces without an edge or a table: value noise on lattices.
 
-use super::random::{lattice, share};
+use super::random::share;
 
 /// The mean square of two-dimensional value noise with lattice values of variance one, over a
 /// cell: the square of the integral of `(1 - s)^2 + s^2` with `s = t^3 (6 t^2 - 15 t + 10)`.
@@ -10,16 +10,38 @@ const MEAN_SQUARE: f64 = (181.0 / 231.0) * (181.0 / 231.0);
 /// -1 and 1 at the lattice points, between them Perlin's quintic (Improving noise, 2002), so that
 /// slope and curvature are continuous.
 pub(super) fn value_noise(key: u64, x: f64, y: f64) -> (f64, [f64; 2]) {
-    let (x0, y0) = (x.floor(), y.floor());
-    let (sx, dx) = quintic(x - x0);
-    let (sy, dy) = quintic(y - y0);
-    #[expect(clippy::cast_possible_truncation, reason = "a site spans few cells")]
-    let (i, j) = (x0 as i64, y0 as i64);
-    let at = |i, j| 2.0 * share(lattice(key, i, j), 0) - 1.0;
-    let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
+    let (i, sx, dx) = split(x);
+    let (j, sy, dy) = split(y);
+    let columns = [mixed(i, 0x9e37_79b9_7f4a_7c15), mixed(i + 1, 0x9e37_79b9_7f4a_7c15)];
+    let rows = [mixed(j, 0xc2b2_ae3d_27d4_eb4f), mixed(j + 1, 0xc2b2_ae3d_27d4_eb4f)];
+    let at = |column: usize, row: usize| corner(key ^ columns[column] ^ rows[row]);
+    let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
     let (low, high) = (a + (b - a) * sx, c + (d - c) * sx);
     let slope_x = ((b - a) * (1.0 - sy) + (d - c) * sy) * dx;
     (low + (high - low) * sy, [slope_x, (high - low) * dy])
+}
+
+/// The lattice line below a coordinate, and the quintic of the rest with its slope.
+fn split(x: f64) -> (i64, f64, f64) {
+    #[expect(clippy::cast_possible_truncation, reason = "a site spans few cells")]
+    let toward_zero = x as i64;
+    #[expect(clippy::cast_precision_loss, reason = "a site spans few cells")]
+    let below = toward_zero - i64::from(x < toward_zero as f64);
+    #[expect(clippy::cast_precision_loss, reason = "a site spans few cells")]
+    let (s, slope) = quintic(x - below as f64);
+    (below, s, slope)
+}
+
+#[expect(clippy::cast_sign_loss, reason = "the bits alone matter")]
+fn mixed(line: i64, factor: u64) -> u64 {
+    (line as u64).wrapping_mul(factor)
+}
+
+/// The value at a lattice point, -1 to 1: one round of mixing, for there are many.
+fn corner(bits: u64) -> f64 {
+    let z = (bits ^ (bits >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);
+    let z = (z ^ (z >> 32)).wrapping_mul(0xd6e8_feb8_6659_fd93);
+    2.0 * share(z ^ (z >> 32), 0) - 1.0
 }
 
 fn quintic(t: f64) -> (f64, f64) {

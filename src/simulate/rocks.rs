@@ -10,7 +10,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
 
 use crate::frame::{Enu, Point};
@@ -37,12 +37,14 @@ pub struct Rock {
 pub struct Shape {
     /// Half-axes of the ellipsoid: long, short, vertical.
     pub half_axes: Vector3<f64>,
-    /// Azimuth of the long axis, counter-clockwise from east, radians.
-    pub turn: f64,
+    /// Unit vector of the long axis, by east and north.
+    pub long_axis: [f64; 2],
     /// Height of the body above its centre.
     pub top: f64,
     /// Outward unit normals of the facets and their distances from the centre.
     pub facets: Vec<(Vector3<f64>, f64)>,
+    /// Half of the outline on the ground; the other half is its mirror image in the centre.
+    outline: Vec<Vector2<f64>>,
 }
 
 /// No rock is lower than this share of the scene's height ratio.
@@ -53,17 +55,22 @@ impl Shape {
         let irregularity = plan.irregularity;
         // Elongation keeps the product of the half-axes, so that the mean width stays about one.
         let elongation = 1.0 + 0.5 * irregularity * uniform(rng);
-        let turn = PI * uniform(rng);
+        let (sin, cos) = (PI * uniform(rng)).sin_cos();
         let top = plan.height_ratio * (1.0 + irregularity * (uniform(rng) - 0.5) * 1.2);
         let top = top.clamp(LOWEST_TOP * plan.height_ratio * 0.5, 1.0);
         let mut shape = Self {
             half_axes: Vector3::new(0.5 * elongation.sqrt(), 0.5 / elongation.sqrt(), top),
-            turn,
+            long_axis: [cos, sin],
             top,
             facets: Vec::new(),
+            outline: Vec::new(),
         };
         if irregularity > 0.0 {
             shape.cut_outline(irregularity, rng);
+        }
+        shape.trace_outline();
+        shape.widen();
+        if irregularity > 0.0 {
             shape.cut_facets(irregularity, rng);
         }
         shape
@@ -112,7 +119,7 @@ impl Shape {
 
     /// How far the uncut ellipsoid reaches along a unit vector.
     fn ellipsoid_support(&self, n: Vector3<f64>) -> f64 {
-        let (sin, cos) = self.turn.sin_cos();
+        let [cos, sin] = self.long_axis;
         let along = n.x * cos + n.y * sin;
         let across = n.y * cos - n.x * sin;
         let a = self.half_axes;
@@ -122,23 +129,44 @@ impl Shape {
     /// How far the outline on the ground reaches along a horizontal direction, its azimuth
     /// counter-clockwise from east: half the silhouette's width across it, in diameters.
     pub fn outline_support(&self, azimuth: f64) -> f64 {
-        const SAMPLES: u32 = 96;
-        // Half a turn is enough: the outline is symmetric about the centre.
-        let reach = (0..SAMPLES).map(|i| {
-            let phi = PI * f64::from(i) / f64::from(SAMPLES);
-            self.outline_radius(phi) * (phi - azimuth).cos().abs()
-        });
+        let direction = Vector2::new(azimuth.cos(), azimuth.sin());
+        let reach = self.outline.iter().map(|p| p.dot(&direction).abs());
         reach.fold(0.0, f64::max)
     }
 
-    /// The outline's radius in a direction, in diameters.
-    fn outline_radius(&self, phi: f64) -> f64 {
-        let (sin, cos) = (phi - self.turn).sin_cos();
-        let ellipse = 1.0 / (cos / self.half_axes.x).hypot(sin / self.half_axes.y);
-        let out = Vector3::new(phi.cos(), phi.sin(), 0.0);
+    /// Scales the outline to a mean width of one, which the cuts have taken from.
+    fn widen(&mut self) {
+        let number = f64::from(u32::try_from(self.outline.len()).unwrap_or(1));
+        let mean = self.outline.iter().map(|p| {
+            // Of the outline's own directions: evenly spread over half a turn.
+            self.outline_support(p.y.atan2(p.x))
+        });
+        let factor = 0.5 * number / mean.sum::<f64>();
+        self.half_axes.x *= factor;
+        self.half_axes.y *= factor;
+        self.facets.iter_mut().for_each(|f| f.1 *= factor);
+        self.outline.iter_mut().for_each(|p| *p *= factor);
+    }
+
+    fn trace_outline(&mut self) {
+        const SAMPLES: u32 = 96;
+        let sample = |i| {
+            let (sin, cos) = (PI * f64::from(i) / f64::from(SAMPLES)).sin_cos();
+            let out = Vector2::new(cos, sin);
+            out * self.outline_radius(out)
+        };
+        self.outline = (0..SAMPLES).map(sample).collect();
+    }
+
+    /// The outline's radius along a horizontal unit vector, in diameters.
+    fn outline_radius(&self, out: Vector2<f64>) -> f64 {
+        let [cos, sin] = self.long_axis;
+        let along = (out.x * cos + out.y * sin) / self.half_axes.x;
+        let across = (out.y * cos - out.x * sin) / self.half_axes.y;
+        let ellipse = 1.0 / along.hypot(across);
         let vertical = self.facets.iter().filter(|(n, _)| n.z == 0.0);
         vertical
-            .map(|(n, distance)| (distance, n.dot(&out)))
+            .map(|(n, distance)| (distance, n.xy().dot(&out)))
             .filter(|&(_, toward)| toward > 0.0)
             .fold(ellipse, |r, (distance, toward)| r.min(distance / toward))
     }

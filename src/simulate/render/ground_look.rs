@@ -11,23 +11,14 @@ pub(super) struct Look {
     pub normal: Vector3<f64>,
 }
 
-/// Relief: scale in metres, slope.
-const RELIEF: [(f64, f64); 6] = [
-    (1.9, 0.035),
-    (0.62, 0.05),
-    (0.21, 0.07),
-    (0.075, 0.10),
-    (0.026, 0.16),
-    (0.009, 0.20),
-];
-
-/// Stains and grains: scale in metres, depth of the change of brightness.
-const STAINS: [(f64, f64); 5] = [
-    (0.8, 0.08),
-    (0.23, 0.10),
-    (0.06, 0.12),
-    (0.02, 0.14),
-    (0.007, 0.16),
+/// Relief and grains: scale in metres, slope, depth of the change of brightness.
+const RELIEF: [(f64, f64, f64); 6] = [
+    (1.9, 0.035, 0.05),
+    (0.62, 0.05, 0.08),
+    (0.21, 0.07, 0.10),
+    (0.075, 0.10, 0.12),
+    (0.026, 0.16, 0.14),
+    (0.009, 0.20, 0.16),
 ];
 
 /// The look of a place whose large-scale slope is given. Detail finer than twice `sharpness_m` fades
@@ -41,23 +32,18 @@ pub(super) fn at(
 ) -> Look {
     let noise = |layer: u64, scale: f64| value_noise(key.wrapping_add(layer), x / scale, y / scale);
     let mut gradient = [-slope[0], -slope[1]];
-    for (layer, (scale, steep)) in (100u64..).zip(RELIEF) {
+    let mut brightness = 1.0;
+    for (layer, (scale, steep, depth)) in (100u64..).zip(RELIEF) {
         let shown = fade(scale, sharpness_m);
         if shown > 0.0 {
-            let (_, by) = noise(layer, scale);
+            let (height, by) = noise(layer, scale);
             gradient[0] -= by[0] * steep * shown;
             gradient[1] -= by[1] * steep * shown;
-        }
-    }
-    let mut brightness = 1.0;
-    for (layer, (scale, depth)) in (200u64..).zip(STAINS) {
-        let shown = fade(scale, sharpness_m);
-        if shown > 0.0 {
-            brightness += depth * shown * noise(layer, scale).0;
+            brightness += depth * shown * height;
         }
     }
     // Drifts of dust between pavements of gravel, and dark stains.
-    let drift = noise(300, 5.5).0 * 0.6 + noise(301, 1.7).0 * 0.4;
+    let drift = noise(300, 5.5).0 * 0.6 + noise(301, 1.4).0 * 0.4;
     let stain = noise(302, 2.7).0 * 0.55 + noise(303, 0.9).0 * 0.45;
     let albedo = mix(colours.gravel, colours.dust, 0.5 + 1.1 * drift);
     let albedo = mix(albedo, colours.stain, 0.9 * (stain - 0.15).max(0.0));

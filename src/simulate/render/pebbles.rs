@@ -158,7 +158,7 @@ impl Layer {
         Some(Stone {
             centre: centre.map(|c| c * self.cell_m),
             half_axes: Vector3::new(radius_m * long, radius_m / long, radius_m * FLATNESS),
-            turn: (share(bits, 2) * std::f64::consts::PI).sin_cos(),
+            turn: half_turn(share(bits, 2)),
             bits: more,
         })
     }
@@ -193,8 +193,17 @@ impl Stone {
     }
 }
 
+/// Sine and cosine of an angle between -90 and 90 degrees, by the tangent of its half.
+fn half_turn(share: f64) -> (f64, f64) {
+    let t = 2.0 * share - 1.0;
+    let scale = 1.0 / (1.0 + t * t);
+    (2.0 * t * scale, (1.0 - t * t) * scale)
+}
+
 fn cell(x: f64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "a site spans few cells")]
-    let cell = x.floor() as i64;
-    cell
+    let toward_zero = x as i64;
+    #[expect(clippy::cast_precision_loss, reason = "a site spans few cells")]
+    let below = toward_zero - i64::from(x < toward_zero as f64);
+    below
 }

@@ -75,7 +75,7 @@ pub(super) fn pebble_albedo(colours: &Colours, bits: u64) -> Colour {
 /// it lies nearest to.
 fn worn_normal(rock: &Rock, local: Vector3<f64>) -> (Vector3<f64>, usize) {
     let shape = &rock.shape;
-    let (sin, cos) = shape.turn.sin_cos();
+    let [cos, sin] = shape.long_axis;
     let a = shape.half_axes;
     let q = Vector3::new(
         local.x * cos + local.y * sin,
