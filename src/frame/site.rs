@@ -2,9 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{
-    Direction, Ecef, Enu, Geodetic, LocalEnu, Planet, Point, RigidTransform, Rotation,
-};
+use super::{Direction, Ecef, Enu, Geodetic, LocalEnu, Planet, Point, RigidTransform, Rotation};
 
 /// A site: a planet and the origin of the local east-north-up frame on it.
 ///

@@ -64,10 +64,11 @@ pub fn appearance(
     let azimuth = across.y.atan2(across.x);
     let width_px = 2.0 * rock.shape.outline_support(azimuth) * rock.diameter_m * px_per_m;
     let elevation = (-to_rock.z).atan2(ground_m);
+    let sight = to_rock.y.atan2(to_rock.x);
     Some(Appearance {
         centre,
         width_px,
-        height_px: rock.shape.aspect(elevation) * rock.diameter_m * px_per_m,
+        height_px: rock.shape.box_height(elevation, sight) * rock.diameter_m * px_per_m,
         range_m: ground_m,
     })
 }

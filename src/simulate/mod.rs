@@ -35,6 +35,9 @@ pub use scene::{
 };
 pub use traverse::View;
 
+#[cfg(test)]
+mod tests;
+
 /// A scene that has been played: the truth and what the sensors made of it.
 #[derive(Debug, Clone)]
 pub struct Simulation {

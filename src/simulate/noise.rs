@@ -12,8 +12,14 @@ const MEAN_SQUARE: f64 = (181.0 / 231.0) * (181.0 / 231.0);
 pub(super) fn value_noise(key: u64, x: f64, y: f64) -> (f64, [f64; 2]) {
     let (i, sx, dx) = split(x);
     let (j, sy, dy) = split(y);
-    let columns = [mixed(i, 0x9e37_79b9_7f4a_7c15), mixed(i + 1, 0x9e37_79b9_7f4a_7c15)];
-    let rows = [mixed(j, 0xc2b2_ae3d_27d4_eb4f), mixed(j + 1, 0xc2b2_ae3d_27d4_eb4f)];
+    let columns = [
+        mixed(i, 0x9e37_79b9_7f4a_7c15),
+        mixed(i + 1, 0x9e37_79b9_7f4a_7c15),
+    ];
+    let rows = [
+        mixed(j, 0xc2b2_ae3d_27d4_eb4f),
+        mixed(j + 1, 0xc2b2_ae3d_27d4_eb4f),
+    ];
     let at = |column: usize, row: usize| corner(key ^ columns[column] ^ rows[row]);
     let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
     let (low, high) = (a + (b - a) * sx, c + (d - c) * sx);

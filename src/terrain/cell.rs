@@ -31,7 +31,11 @@ impl March<'_> {
     /// A stretch over one cell.
     pub fn cell(&mut self, over: Over<'_>, line: Line, cell: [usize; 2]) -> ControlFlow<Found> {
         let Over {
-            leg, number, s0, s1, ..
+            leg,
+            number,
+            s0,
+            s1,
+            ..
         } = over;
         let tile = &self.model.tiles[number];
         let Some(patch) = tile.patch(cell) else {
@@ -134,7 +138,10 @@ impl March<'_> {
 
     /// The root between two ends of which the first is above the surface and the second below.
     fn bisect(&self, crossing: &Crossing, ends: (f64, f64)) -> Option<f64> {
-        let under = |t: f64| self.above(crossing, t).is_some_and(|(above, _)| above <= 0.0);
+        let under = |t: f64| {
+            self.above(crossing, t)
+                .is_some_and(|(above, _)| above <= 0.0)
+        };
         let (mut above, mut below) = ends;
         if under(above) || !under(below) {
             return None;
@@ -214,5 +221,7 @@ impl Crossing {
     reason = "the number is clamped"
 )]
 fn pieces(length_m: f64) -> u32 {
-    (length_m / PIECE_M).ceil().clamp(1.0, f64::from(MAX_PIECES)) as u32
+    (length_m / PIECE_M)
+        .ceil()
+        .clamp(1.0, f64::from(MAX_PIECES)) as u32
 }

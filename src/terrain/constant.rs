@@ -64,7 +64,13 @@ mod tests {
     fn on_a_sphere_the_closed_form_holds() {
         let site = Site::new(Planet::MOON, Geodetic::from_degrees(-45.0, 12.0, 500.0));
         let radius = 1_737_400.0 + 480.0;
-        for (up, down_deg) in [(1.5, 1.0), (1.5, 0.33), (800.0, 30.0), (60_000.0, 14.0), (3.0, 90.0)] {
+        for (up, down_deg) in [
+            (1.5, 1.0),
+            (1.5, 0.33),
+            (800.0, 30.0),
+            (60_000.0, 14.0),
+            (3.0, 90.0),
+        ] {
             let ray = ray([300.0, -4000.0, up], 77.0, down_deg);
             let centre = Vector3::new(0.0, 0.0, -(1_737_400.0 + 500.0));
             let m = ray.origin.xyz - centre;
@@ -72,7 +78,10 @@ mod tests {
             let c = m.norm_squared() - radius * radius;
             let expected = -b - (b * b - c).sqrt();
             let found = first_not_above(&site, ray, 480.0, 0.0).unwrap();
-            assert!((found - expected).abs() < 1e-6, "{down_deg}: {found} {expected}");
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "{down_deg}: {found} {expected}"
+            );
         }
     }
 
@@ -93,11 +102,17 @@ mod tests {
                 let ecef = |t| planet.ellipsoid.to_ecef(site.geodetic(ray.at(t))).xyz;
                 // The direction from two far points: the line is straight in any frame.
                 let direction = (ecef(1e5) - ecef(0.0)) / 1e5;
-                let (o, d) = (ecef(0.0).component_mul(&scale), direction.component_mul(&scale));
+                let (o, d) = (
+                    ecef(0.0).component_mul(&scale),
+                    direction.component_mul(&scale),
+                );
                 let (qa, qb, qc) = (d.dot(&d), o.dot(&d), o.dot(&o) - 1.0);
                 let expected = qc / (-qb + (qb * qb - qa * qc).sqrt());
                 let found = first_not_above(&site, ray, 0.0, 0.0).unwrap();
-                assert!((found - expected).abs() < 2e-6, "{down_deg}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() < 2e-6,
+                    "{down_deg}: {found} {expected}"
+                );
             }
         }
     }
@@ -106,7 +121,8 @@ mod tests {
     fn over_the_horizon_there_is_no_ground() {
         let site = Site::new(Planet::EARTH, Geodetic::from_degrees(49.0, 8.4, 115.0));
         // The horizon's dip from 2 m is sqrt(2 h / R) = 0.0454 degrees.
-        let dip = |down_deg| first_not_above(&site, ray([0.0, 0.0, 2.0], 10.0, down_deg), 115.0, 0.0);
+        let dip =
+            |down_deg| first_not_above(&site, ray([0.0, 0.0, 2.0], 10.0, down_deg), 115.0, 0.0);
         assert!(dip(0.044).is_none());
         let at = dip(0.047).unwrap();
         assert!(at > 3000.0 && at < 5100.0);

@@ -44,7 +44,9 @@ pub struct Affine {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GridError {
     /// Too small to interpolate in, or not as many heights as posts.
-    #[error("found {heights} heights for {columns} x {rows} posts, expected at least 2 x 2, one height a post")]
+    #[error(
+        "found {heights} heights for {columns} x {rows} posts, expected at least 2 x 2, one height a post"
+    )]
     Size {
         /// Heights given.
         heights: usize,
@@ -54,7 +56,9 @@ pub enum GridError {
         rows: usize,
     },
     /// The posts do not span a plane.
-    #[error("found georeferencing that puts all posts on one line, expected one that spans an area")]
+    #[error(
+        "found georeferencing that puts all posts on one line, expected one that spans an area"
+    )]
     Degenerate,
 }
 
@@ -198,8 +202,8 @@ impl Affine {
     /// The map back, from coordinates to column and row; `None` where the posts span no area.
     pub fn inverse(&self) -> Option<Affine> {
         let det = self.x_column * self.y_row - self.x_row * self.y_column;
-        let size = (self.x_column.abs() + self.x_row.abs())
-            * (self.y_column.abs() + self.y_row.abs());
+        let size =
+            (self.x_column.abs() + self.x_row.abs()) * (self.y_column.abs() + self.y_row.abs());
         let finite = size.is_finite() && self.x0.is_finite() && self.y0.is_finite();
         (finite && size > 0.0 && det.abs() > 1e-12 * size).then(|| {
             let (a, b) = (self.y_row / det, -self.x_row / det);
@@ -264,7 +268,8 @@ mod tests {
             "found 5 heights for 3 x 2 posts, expected at least 2 x 2, one height a post"
         );
         let line = Affine { y_row: 0.0, ..map };
-        let error = HeightGrid::new(2, 2, Posts::F64(vec![0.0; 4]), line, "EPSG:32632").unwrap_err();
+        let error =
+            HeightGrid::new(2, 2, Posts::F64(vec![0.0; 4]), line, "EPSG:32632").unwrap_err();
         assert_eq!(
             error.to_string(),
             "found georeferencing that puts all posts on one line, expected one that spans an area"

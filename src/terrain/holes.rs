@@ -30,7 +30,12 @@ impl Holes {
         }
         let mut parent: Vec<usize> = (0..runs.len()).collect();
         for row in 1..rows.len() - 1 {
-            join_rows(&runs, &mut parent, rows[row - 1]..rows[row], rows[row]..rows[row + 1]);
+            join_rows(
+                &runs,
+                &mut parent,
+                rows[row - 1]..rows[row],
+                rows[row]..rows[row + 1],
+            );
         }
         let mut highest = vec![f64::NEG_INFINITY; runs.len()];
         for row in 0..rows.len() - 1 {
@@ -136,7 +141,14 @@ mod tests {
             })
             .collect();
         let map = Affine::north_up(0.0, 0.0, 1.0);
-        HeightGrid::new(rows[0].len(), rows.len(), Posts::F32(heights), map, "EPSG:32632").unwrap()
+        HeightGrid::new(
+            rows[0].len(),
+            rows.len(),
+            Posts::F32(heights),
+            map,
+            "EPSG:32632",
+        )
+        .unwrap()
     }
 
     #[test]

@@ -63,7 +63,12 @@ pub(super) struct Over<'l> {
 }
 
 /// The first hit of a ray within a horizontal distance: how far along the ray.
-pub(super) fn first_hit(site: &Site, model: &Model, ray: Ray<Enu>, max_ground_range_m: f64) -> Found {
+pub(super) fn first_hit(
+    site: &Site,
+    model: &Model,
+    ray: Ray<Enu>,
+    max_ground_range_m: f64,
+) -> Found {
     let mut march = March {
         site,
         model,
@@ -189,7 +194,13 @@ impl March<'_> {
 
     /// A stretch over a raster and whatever lies around it.
     pub fn scan(&mut self, over: Over<'_>) -> ControlFlow<Found> {
-        let Over { leg, number, s0, s1, .. } = over;
+        let Over {
+            leg,
+            number,
+            s0,
+            s1,
+            ..
+        } = over;
         if s1 <= s0 {
             return Continue(());
         }

@@ -68,7 +68,10 @@ impl Model {
         let bend = tiles.iter().map(|tile| tile.bend).fold(1e-12, f64::max);
         Ok(Self {
             top_m: under_holes_m,
-            bottom_m: tiles.iter().map(|tile| tile.bottom_m).fold(lowest, f64::min),
+            bottom_m: tiles
+                .iter()
+                .map(|tile| tile.bottom_m)
+                .fold(lowest, f64::min),
             leg_m: LEG_M.min((8.0 * LEG_BEND / bend).sqrt()),
             bounds: bounds(site, &tiles),
             outside_m,

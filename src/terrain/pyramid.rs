@@ -117,8 +117,7 @@ mod tests {
             .collect();
         let map = Affine::north_up(0.0, 0.0, 1.0);
         let size = (columns as usize, rows as usize);
-        let grid =
-            HeightGrid::new(size.0, size.1, Posts::F64(heights), map, "EPSG:32632").unwrap();
+        let grid = HeightGrid::new(size.0, size.1, Posts::F64(heights), map, "EPSG:32632").unwrap();
         let pyramid = Pyramid::new(&grid, &Holes::new(&grid), f64::NEG_INFINITY);
         assert_eq!(pyramid.levels(), 4);
         for level in 1..=pyramid.levels() {

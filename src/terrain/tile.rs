@@ -46,7 +46,10 @@ impl Tile {
         let middle_deg = middle_longitude_deg(site, &crs, &grid);
         let grid = crop(site, &crs, middle_deg, grid);
         // The constructor of the raster has seen the inverse exist.
-        let post_from_crs = grid.crs_from_post().inverse().unwrap_or(grid.crs_from_post());
+        let post_from_crs = grid
+            .crs_from_post()
+            .inverse()
+            .unwrap_or(grid.crs_from_post());
         let holes = Holes::new(&grid);
         let pyramid = Pyramid::new(&grid, &holes, under_holes_m);
         let (bottom_m, top_m, step_m) = extremes(&grid);
@@ -74,12 +77,21 @@ impl Tile {
     /// Greatest column and row of a place on the raster: those of the last post.
     #[expect(clippy::cast_precision_loss, reason = "rasters have under 2^53 posts")]
     pub fn last(&self) -> [f64; 2] {
-        [(self.grid.columns() - 1) as f64, (self.grid.rows() - 1) as f64]
+        [
+            (self.grid.columns() - 1) as f64,
+            (self.grid.rows() - 1) as f64,
+        ]
     }
 
     /// Column and row, in and around the raster, of a place; `None` where its map does not reach.
     pub fn position(&self, place: Geodetic) -> Option<[f64; 2]> {
-        position(&self.crs, &self.grid, &self.post_from_crs, self.middle_deg, place)
+        position(
+            &self.crs,
+            &self.grid,
+            &self.post_from_crs,
+            self.middle_deg,
+            place,
+        )
     }
 
     /// The column and row of the cell at a position, its last edges included; `None` outside.
@@ -99,8 +111,8 @@ impl Tile {
     /// The surface over a cell; `None` in a hole.
     #[expect(clippy::cast_precision_loss, reason = "rasters have under 2^53 posts")]
     pub fn patch(&self, [column, row]: [usize; 2]) -> Option<Patch> {
-        let posts = [(0, 0), (1, 0), (0, 1), (1, 1)]
-            .map(|(i, j)| self.grid.height_m(column + i, row + j));
+        let posts =
+            [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| self.grid.height_m(column + i, row + j));
         Patch::new(column as f64, row as f64, posts)
     }
 
@@ -157,7 +169,10 @@ impl Tile {
             return Some(0.0);
         }
         let last = self.last();
-        let near = [position[0].clamp(0.0, last[0]), position[1].clamp(0.0, last[1])];
+        let near = [
+            position[0].clamp(0.0, last[0]),
+            position[1].clamp(0.0, last[1]),
+        ];
         let edge = self.place(near, place.height_m)?;
         Some(site.enu(edge).distance(point))
     }
@@ -221,7 +236,10 @@ fn middle_longitude_deg(site: &Site, crs: &Crs, grid: &HeightGrid) -> Option<f64
     // Datums differ by less than a hundredth of a degree; a projection is in larger units.
     let turn = (x - origin.lon_deg()).rem_euclid(360.0);
     let degrees = turn.min(360.0 - turn) < 0.01 && (y - origin.lat_deg()).abs() < 0.01;
-    let middle = ((grid.columns() - 1) as f64 / 2.0, (grid.rows() - 1) as f64 / 2.0);
+    let middle = (
+        (grid.columns() - 1) as f64 / 2.0,
+        (grid.rows() - 1) as f64 / 2.0,
+    );
     // Within metres of a projection's own origin both read zero: there the units tell.
     let (x1, _) = crs.xy(origin.lon + 0.001, origin.lat).ok()?;
     let turn = (x1 - x - 0.001f64.to_degrees()).rem_euclid(360.0);
@@ -255,8 +273,8 @@ fn crop(site: &Site, crs: &Crs, middle_deg: Option<f64>, grid: HeightGrid) -> He
         }
     }
     let last = [(grid.columns() - 1) as f64, (grid.rows() - 1) as f64];
-    let polar = site.origin().lat.abs() + KEPT_M / site.planet().ellipsoid.a
-        > std::f64::consts::FRAC_PI_2;
+    let polar =
+        site.origin().lat.abs() + KEPT_M / site.planet().ellipsoid.a > std::f64::consts::FRAC_PI_2;
     let outside = (0..2).any(|i| high[i] <= 0.0 || low[i] >= last[i]);
     let inside = (0..2).all(|i| low[i] <= 0.0 && high[i] >= last[i]);
     if outside || inside || (middle_deg.is_some() && polar) {

@@ -83,12 +83,16 @@ fn smoothed(studio: &Studio, rows: &[Vec<Sample>], u: u32, v: u32) -> Colour {
         i.checked_sub(1).and_then(|i| rows[j].get(i)),
         j.checked_sub(1).and_then(|j| rows[j].get(i)),
     ];
-    let mut edges = others.iter().flatten().filter(|o| o.surface != here.surface);
+    let mut edges = others
+        .iter()
+        .flatten()
+        .filter(|o| o.surface != here.surface);
     let Some(first) = edges.next() else {
         return here.light;
     };
     // Outlines of rocks and of the horizon deserve more rays than pebbles do.
-    let is_outline = |s: &Sample| !matches!(s.surface, Surface::Ground { .. } | Surface::Pebble { .. });
+    let is_outline =
+        |s: &Sample| !matches!(s.surface, Surface::Ground { .. } | Surface::Pebble { .. });
     let offsets = if is_outline(&here) || is_outline(first) || edges.any(|o| is_outline(o)) {
         &GRID[..]
     } else {
@@ -99,7 +103,12 @@ fn smoothed(studio: &Studio, rows: &[Vec<Sample>], u: u32, v: u32) -> Colour {
 }
 
 /// A rotated grid, symmetric about the pixel's centre, and so are its first two places.
-const GRID: [[f64; 2]; 4] = [[0.125, 0.375], [-0.125, -0.375], [0.375, -0.125], [-0.375, 0.125]];
+const GRID: [[f64; 2]; 4] = [
+    [0.125, 0.375],
+    [-0.125, -0.375],
+    [0.375, -0.125],
+    [-0.375, 0.125],
+];
 
 /// Writes a picture in its format.
 ///

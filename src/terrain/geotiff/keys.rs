@@ -83,7 +83,9 @@ impl GeoKeys {
                 _ => continue,
             };
             let value = value.ok_or_else(|| {
-                fault(&format!("found key {key} beyond its values, expected it within"))
+                fault(&format!(
+                    "found key {key} beyond its values, expected it within"
+                ))
             })?;
             keys.insert(key, value);
         }
@@ -164,7 +166,9 @@ mod tests {
 
     #[test]
     fn keys_are_found_in_all_three_places() {
-        let directory = [1, 1, 0, 3, 1024, 0, 1, 2, 2057, 34736, 1, 1, 1026, 34737, 5, 2];
+        let directory = [
+            1, 1, 0, 3, 1024, 0, 1, 2, 2057, 34736, 1, 1, 1026, 34737, 5, 2,
+        ];
         let keys = GeoKeys::parse(&directory, &[0.0, 3_396_190.0], "x|Mars|y|").unwrap();
         assert_eq!(keys.code(MODEL_TYPE), Some(2));
         assert_eq!(keys.number(GEOG_SEMI_MAJOR), Some(3_396_190.0));
@@ -177,7 +181,10 @@ mod tests {
         let error = GeoKeys::parse(&[1, 1, 0, 2, 1024, 0, 1, 2], &[], "").unwrap_err();
         assert_eq!(error.problem, "found 1 keys, expected 2 as its header says");
         let error = GeoKeys::parse(&[1, 1, 0, 1, 2057, 34736, 1, 3], &[], "").unwrap_err();
-        assert_eq!(error.problem, "found key 2057 beyond its values, expected it within");
+        assert_eq!(
+            error.problem,
+            "found key 2057 beyond its values, expected it within"
+        );
     }
 
     #[test]
@@ -185,7 +192,9 @@ mod tests {
         let unit = |keys: &[u16]| {
             let mut directory = vec![1, 1, 0, u16::try_from(keys.len() / 4).unwrap()];
             directory.extend(keys);
-            GeoKeys::parse(&directory, &[], "").unwrap().vertical_unit_m()
+            GeoKeys::parse(&directory, &[], "")
+                .unwrap()
+                .vertical_unit_m()
         };
         assert_eq!(unit(&[]), Ok(1.0));
         assert_eq!(unit(&[4096, 0, 1, 5030, 4099, 0, 1, 9001]), Ok(1.0));

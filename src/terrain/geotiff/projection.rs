@@ -69,7 +69,10 @@ fn geographic(keys: &GeoKeys) -> Result<String, KeyFault> {
     }
     match cited(keys, &[CITATION, GEOG_CITATION]) {
         Some(code) => Ok(code),
-        None => Ok(format!("+proj=longlat {} +no_defs +type=crs", ellipsoid(keys)?)),
+        None => Ok(format!(
+            "+proj=longlat {} +no_defs +type=crs",
+            ellipsoid(keys)?
+        )),
     }
 }
 
@@ -85,11 +88,15 @@ fn cited(keys: &GeoKeys, citations: &[u16]) -> Option<String> {
         .iter()
         .filter_map(|&key| keys.text(key))
         .find_map(|text| {
-            ["IAU_2015:", "EPSG:", "ESRI:"].into_iter().find_map(|authority| {
-                let code = &text[text.find(authority)? + authority.len()..];
-                let end = code.find(|c: char| !c.is_ascii_digit()).unwrap_or(code.len());
-                (end > 0).then(|| format!("{authority}{}", &code[..end]))
-            })
+            ["IAU_2015:", "EPSG:", "ESRI:"]
+                .into_iter()
+                .find_map(|authority| {
+                    let code = &text[text.find(authority)? + authority.len()..];
+                    let end = code
+                        .find(|c: char| !c.is_ascii_digit())
+                        .unwrap_or(code.len());
+                    (end > 0).then(|| format!("{authority}{}", &code[..end]))
+                })
         })
 }
 
@@ -192,7 +199,11 @@ mod tests {
     use super::*;
     use crate::frame::{Crs, Planet};
 
-    fn definition(codes: &[(u16, u16)], numbers: &[(u16, f64)], citation: &str) -> Result<String, String> {
+    fn definition(
+        codes: &[(u16, u16)],
+        numbers: &[(u16, f64)],
+        citation: &str,
+    ) -> Result<String, String> {
         let total = codes.len() + numbers.len() + usize::from(!citation.is_empty());
         let mut directory = vec![1, 1, 0, u16::try_from(total).unwrap()];
         for &(key, code) in codes {
@@ -215,22 +226,58 @@ mod tests {
         assert_eq!(utm.as_deref(), Ok("EPSG:32632"));
         let degrees = definition(&[(1024, 2), (2048, 4326), (2054, 9102)], &[], "");
         assert_eq!(degrees.as_deref(), Ok("EPSG:4326"));
-        let mars = definition(&[(1024, 1), (3072, 32767)], &[], "IAU_2015:49910 (equirectangular)");
+        let mars = definition(
+            &[(1024, 1), (3072, 32767)],
+            &[],
+            "IAU_2015:49910 (equirectangular)",
+        );
         assert_eq!(mars.as_deref(), Ok("IAU_2015:49910"));
     }
 
     /// The keys that GDAL 3.6 writes for the IAU's codes, against PROJ's own definition of these.
     #[test]
     fn planetary_definitions_agree_with_their_codes() {
-        let mars = [(3078, 0.0), (3088, 0.0), (3089, 0.0), (3082, 0.0), (3083, 0.0)];
+        let mars = [
+            (3078, 0.0),
+            (3088, 0.0),
+            (3089, 0.0),
+            (3082, 0.0),
+            (3083, 0.0),
+        ];
         let mars_axes = [(2057, 3_396_190.0), (2058, 3_396_190.0), (2061, 0.0)];
-        let moon = [(3081, -90.0), (3095, 0.0), (3092, 1.0), (3082, 0.0), (3083, 0.0)];
+        let moon = [
+            (3081, -90.0),
+            (3095, 0.0),
+            (3092, 1.0),
+            (3082, 0.0),
+            (3083, 0.0),
+        ];
         let moon_axes = [(2057, 1_737_400.0), (2058, 1_737_400.0), (2061, 0.0)];
         for (planet, code, method, numbers, axes, (lon, lat)) in [
-            (Planet::MARS, "IAU_2015:49910", 17, mars, mars_axes, (1.3, 0.4)),
-            (Planet::MOON, "IAU_2015:30135", 15, moon, moon_axes, (0.7, -1.5)),
+            (
+                Planet::MARS,
+                "IAU_2015:49910",
+                17,
+                mars,
+                mars_axes,
+                (1.3, 0.4),
+            ),
+            (
+                Planet::MOON,
+                "IAU_2015:30135",
+                15,
+                moon,
+                moon_axes,
+                (0.7, -1.5),
+            ),
         ] {
-            let codes = [(1024, 1), (2048, 32767), (3072, 32767), (3075, method), (3076, 9001)];
+            let codes = [
+                (1024, 1),
+                (2048, 32767),
+                (3072, 32767),
+                (3075, method),
+                (3076, 9001),
+            ];
             let numbers: Vec<(u16, f64)> = numbers.into_iter().chain(axes).collect();
             let found = Crs::new(&definition(&codes, &numbers, "").unwrap(), planet).unwrap();
             let expected = Crs::new(code, planet).unwrap().xy(lon, lat).unwrap();
@@ -250,7 +297,13 @@ mod tests {
             (3086, 2_296_583.333_333_333),
             (3087, 9_842_500.0),
         ];
-        let codes = [(1024, 1), (2048, 4269), (3072, 32767), (3075, 8), (3076, 9003)];
+        let codes = [
+            (1024, 1),
+            (2048, 4269),
+            (3072, 32767),
+            (3075, 8),
+            (3076, 9003),
+        ];
         let found = Crs::new(&definition(&codes, &numbers, "").unwrap(), Planet::EARTH).unwrap();
         let code = Crs::new("EPSG:2277", Planet::EARTH).unwrap();
         let (lon, lat) = (-97.7f64.to_radians(), 30.3f64.to_radians());
@@ -286,7 +339,13 @@ mod tests {
                  ellipsoid's axes",
             ),
             (
-                &[(1024, 1), (2048, 4326), (3072, 32767), (3075, 1), (3076, 9005)],
+                &[
+                    (1024, 1),
+                    (2048, 4326),
+                    (3072, 32767),
+                    (3075, 1),
+                    (3076, 9005),
+                ],
                 "ProjLinearUnitsGeoKey: found unit 9005, expected 9001 (metre), 9002 or 9003 \
                  (foot), or its size",
             ),

@@ -36,7 +36,10 @@ type Reader = Decoder<BufReader<File>>;
 /// where it is no TIFF, has no georeferencing or no usable CRS, or more than one band.
 pub fn read_geotiff(path: &Path, shown: &str) -> Result<HeightGrid, Error> {
     let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
-    let size = file.metadata().map_err(|error| Error::io(path, "read", error))?.len();
+    let size = file
+        .metadata()
+        .map_err(|error| Error::io(path, "read", error))?
+        .len();
     let place = Place::file(shown);
     Ok(read(BufReader::new(file), size).map_err(|problem| problem.fault(place))?)
 }
@@ -67,7 +70,9 @@ impl Problem {
     fn fault(self, place: Place) -> Fault {
         match self {
             Self::Field(field, problem) => Fault::new(place, field, problem),
-            Self::Decoding(TiffError::IoError(error)) if error.kind() == ErrorKind::UnexpectedEof => {
+            Self::Decoding(TiffError::IoError(error))
+                if error.kind() == ErrorKind::UnexpectedEof =>
+            {
                 Fault::found(place, "", "a file that ends early", "a whole TIFF file")
             }
             Self::Decoding(error) => Fault::new(place, "", format!("cannot be decoded: {error}")),
@@ -94,9 +99,11 @@ fn read(file: BufReader<File>, size: u64) -> Result<HeightGrid, Problem> {
     let samples = samples(&mut reader, width, height, nodata)?;
     let posts = match (samples, scaling.0 * unit_m, scaling.1 * unit_m) {
         (samples, 1.0, 0.0) => samples,
-        (samples, scale, offset) => {
-            Posts::F64((0..samples.len()).map(|i| samples.get(i) * scale + offset).collect())
-        }
+        (samples, scale, offset) => Posts::F64(
+            (0..samples.len())
+                .map(|i| samples.get(i) * scale + offset)
+                .collect(),
+        ),
     };
     if (0..posts.len()).all(|i| posts.get(i).is_nan()) {
         return Err(Problem::found("", "no known height", "some"));
@@ -117,14 +124,24 @@ fn limits() -> Limits {
 /// Whether the first image can be heights; its width and height.
 fn check_image(reader: &mut Reader, size: u64) -> Result<(u32, u32), Problem> {
     let (width, height) = reader.dimensions()?;
-    let bands = reader.find_tag_unsigned::<u16>(Tag::SamplesPerPixel)?.unwrap_or(1);
+    let bands = reader
+        .find_tag_unsigned::<u16>(Tag::SamplesPerPixel)?
+        .unwrap_or(1);
     if bands != 1 {
-        return Err(Problem::found("SamplesPerPixel", bands, "1, a band of heights"));
+        return Err(Problem::found(
+            "SamplesPerPixel",
+            bands,
+            "1, a band of heights",
+        ));
     }
     // The decoder would turn the heights upside down.
     let shown = reader.find_tag_unsigned::<u16>(Tag::PhotometricInterpretation)?;
     if shown == Some(PhotometricInterpretation::WhiteIsZero.to_u16()) {
-        return Err(Problem::found("PhotometricInterpretation", "WhiteIsZero", "BlackIsZero"));
+        return Err(Problem::found(
+            "PhotometricInterpretation",
+            "WhiteIsZero",
+            "BlackIsZero",
+        ));
     }
     let bits = match reader.colortype()? {
         ColorType::Gray(bits) => u64::from(bits),
@@ -221,7 +238,11 @@ fn crs_from_post(reader: &mut Reader, is_point: bool) -> Result<Affine, Problem>
             ));
         }
     };
-    let (x0, y0) = if is_point { (corner.x0, corner.y0) } else { corner.apply(0.5, 0.5) };
+    let (x0, y0) = if is_point {
+        (corner.x0, corner.y0)
+    } else {
+        corner.apply(0.5, 0.5)
+    };
     Ok(Affine { x0, y0, ..corner })
 }
 
@@ -309,13 +330,33 @@ fn samples(
 )]
 fn heights(samples: DecodingResult, nodata: Option<f64>) -> Posts {
     let single = nodata.map(|nodata| nodata as f32);
-    let known_f32 = |h: f32| if h.is_finite() && Some(h) != single { h } else { f32::NAN };
-    let known = |h: f64| if h.is_finite() && Some(h) != nodata { h } else { f64::NAN };
+    let known_f32 = |h: f32| {
+        if h.is_finite() && Some(h) != single {
+            h
+        } else {
+            f32::NAN
+        }
+    };
+    let known = |h: f64| {
+        if h.is_finite() && Some(h) != nodata {
+            h
+        } else {
+            f64::NAN
+        }
+    };
     match samples {
-        DecodingResult::U8(all) => Posts::F32(all.into_iter().map(|h| known_f32(h.into())).collect()),
-        DecodingResult::I8(all) => Posts::F32(all.into_iter().map(|h| known_f32(h.into())).collect()),
-        DecodingResult::U16(all) => Posts::F32(all.into_iter().map(|h| known_f32(h.into())).collect()),
-        DecodingResult::I16(all) => Posts::F32(all.into_iter().map(|h| known_f32(h.into())).collect()),
+        DecodingResult::U8(all) => {
+            Posts::F32(all.into_iter().map(|h| known_f32(h.into())).collect())
+        }
+        DecodingResult::I8(all) => {
+            Posts::F32(all.into_iter().map(|h| known_f32(h.into())).collect())
+        }
+        DecodingResult::U16(all) => {
+            Posts::F32(all.into_iter().map(|h| known_f32(h.into())).collect())
+        }
+        DecodingResult::I16(all) => {
+            Posts::F32(all.into_iter().map(|h| known_f32(h.into())).collect())
+        }
         DecodingResult::F16(all) => {
             Posts::F32(all.into_iter().map(|h| known_f32(h.to_f32())).collect())
         }

@@ -91,8 +91,15 @@ impl Keys {
         };
         keys.code(MODEL_TYPE, model_type);
         keys.code(RASTER_TYPE, 1);
-        let own = if model_type == 2 { GEOGRAPHIC_TYPE } else { PROJECTED_TYPE };
-        let epsg = grid.crs().strip_prefix("EPSG:").and_then(|code| code.parse().ok());
+        let own = if model_type == 2 {
+            GEOGRAPHIC_TYPE
+        } else {
+            PROJECTED_TYPE
+        };
+        let epsg = grid
+            .crs()
+            .strip_prefix("EPSG:")
+            .and_then(|code| code.parse().ok());
         let is_code = grid.crs().split_once(':').is_some_and(|(authority, code)| {
             !authority.contains(char::is_whitespace) && code.bytes().all(|b| b.is_ascii_digit())
         });

@@ -30,7 +30,10 @@ fn above(terrain: &Terrain, ray: Ray<Enu>, t: f64) -> (f64, Option<f64>) {
     };
     let place = site().geodetic(ray.at(t));
     let surface = model.surface(place);
-    (place.height_m, surface.map(|surface| place.height_m - surface.height_m()))
+    (
+        place.height_m,
+        surface.map(|surface| place.height_m - surface.height_m()),
+    )
 }
 
 /// The rule of unknown ground: how high a ray must be to pass.
@@ -51,7 +54,11 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
     let Shape::Model(model) = &terrain.shape else {
         panic!("a model");
     };
-    let steepest = model.tiles.iter().map(|tile| tile.step_m).fold(0.0, f64::max);
+    let steepest = model
+        .tiles
+        .iter()
+        .map(|tile| tile.step_m)
+        .fold(0.0, f64::max);
     let direction = ray.direction.xyz();
     let far = range / direction.xy().norm();
     let (mut t, mut before) = (0.0f64, 0.0f64);
@@ -60,7 +67,11 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
         let (height, over) = above(terrain, ray, t);
         if t > far {
             let top = constant::first_not_above(&site(), ray, model.top_m, far);
-            return Err(if top.is_none() { Miss::AboveHorizon } else { Miss::TooFar });
+            return Err(if top.is_none() {
+                Miss::AboveHorizon
+            } else {
+                Miss::TooFar
+            });
         }
         let rises = site().up(site().geodetic(ray.at(t))).xyz().dot(&direction) > 0.0;
         let step = match over {
@@ -97,7 +108,10 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
 fn bisect(terrain: &Terrain, ray: Ray<Enu>, mut low: f64, mut high: f64) -> f64 {
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if above(terrain, ray, middle).1.is_some_and(|over| over <= 0.0) {
+        if above(terrain, ray, middle)
+            .1
+            .is_some_and(|over| over <= 0.0)
+        {
             high = middle;
         } else {
             low = middle;
@@ -107,7 +121,11 @@ fn bisect(terrain: &Terrain, ray: Ray<Enu>, mut low: f64, mut high: f64) -> f64 
 }
 
 /// Compares many rays; the march is repeated in finer steps where it may have stepped over a hit.
-fn compare(terrain: &Terrain, rays: impl Iterator<Item = (Ray<Enu>, f64)>, longest: f64) -> [usize; 5] {
+fn compare(
+    terrain: &Terrain,
+    rays: impl Iterator<Item = (Ray<Enu>, f64)>,
+    longest: f64,
+) -> [usize; 5] {
     let mut counts = [0; 5];
     for (number, (ray, range)) in rays.enumerate() {
         let found = terrain.first_hit(ray, range).map(|hit| hit.distance_m);
@@ -117,7 +135,10 @@ fn compare(terrain: &Terrain, rays: impl Iterator<Item = (Ray<Enu>, f64)>, longe
             expected = march(terrain, ray, range, 1e-4);
         }
         let real = agree(terrain, ray, found, expected);
-        assert!(real, "ray {number} {ray:?} within {range}: found {found:?}, expected {expected:?}");
+        assert!(
+            real,
+            "ray {number} {ray:?} within {range}: found {found:?}, expected {expected:?}"
+        );
         counts[match found {
             Ok(_) => 0,
             Err(Miss::AboveHorizon) => 1,
@@ -129,13 +150,20 @@ fn compare(terrain: &Terrain, rays: impl Iterator<Item = (Ray<Enu>, f64)>, longe
     counts
 }
 
-fn agree(terrain: &Terrain, ray: Ray<Enu>, found: Result<f64, Miss>, expected: Result<f64, Miss>) -> bool {
+fn agree(
+    terrain: &Terrain,
+    ray: Ray<Enu>,
+    found: Result<f64, Miss>,
+    expected: Result<f64, Miss>,
+) -> bool {
     match (found, expected) {
         // Along a surface that a ray grazes, rounding of 1e-9 m in the height moves the hit.
         (Ok(a), Ok(b)) => {
             (a - b).abs() < 1e-6
                 || ((a - b).abs() < 1e-3
-                    && above(terrain, ray, a).1.is_some_and(|over| over.abs() < 1e-8))
+                    && above(terrain, ray, a)
+                        .1
+                        .is_some_and(|over| over.abs() < 1e-8))
         }
         (a, b) => a == b,
     }
@@ -144,9 +172,17 @@ fn agree(terrain: &Terrain, ray: Ray<Enu>, found: Result<f64, Miss>, expected: R
 /// Ridges, saw teeth, a wall of 3 m in one cell and a pit.
 fn rugged(x: f64, y: f64) -> f64 {
     let waves = 1.2 * (x / 6.0).sin() * (y / 5.0).cos() + 0.25 * (1.7 * x + 0.6 * y).sin();
-    let teeth = if y > 20.0 { 0.5 * (x / 3.0).rem_euclid(1.0) } else { 0.0 };
+    let teeth = if y > 20.0 {
+        0.5 * (x / 3.0).rem_euclid(1.0)
+    } else {
+        0.0
+    };
     let wall = if (18.0..=21.0).contains(&x) { 3.0 } else { 0.0 };
-    let pit = if (x + 25.0).hypot(y + 20.0) < 5.0 { -2.0 } else { 0.0 };
+    let pit = if (x + 25.0).hypot(y + 20.0) < 5.0 {
+        -2.0
+    } else {
+        0.0
+    };
     115.0 + waves + teeth + wall + pit
 }
 
@@ -157,7 +193,9 @@ fn rays(terrain: &Terrain, count: usize, seed: u64, half: f64) -> Vec<(Ray<Enu>,
     (0..count)
         .map(|number| {
             let (east, north) = (random.between(-half, half), random.between(-half, half));
-            let ground = terrain.ground_at(east, north).map_or(0.0, |ground| ground.point.xyz.z);
+            let ground = terrain
+                .ground_at(east, north)
+                .map_or(0.0, |ground| ground.point.xyz.z);
             let up = ground
                 + match number % 8 {
                     0 => random.between(-0.2, 0.1),
@@ -169,13 +207,20 @@ fn rays(terrain: &Terrain, count: usize, seed: u64, half: f64) -> Vec<(Ray<Enu>,
                 1 => random.between(0.0, 25.0),
                 _ => random.between(-10.0, 90.0),
             };
-            let range = if number % 4 == 0 { f64::INFINITY } else { random.between(1.0, 40.0) };
+            let range = if number % 4 == 0 {
+                f64::INFINITY
+            } else {
+                random.between(1.0, 40.0)
+            };
             let azimuth_deg = match number % 10 {
                 // Along the rows and columns of the raster, as near as can be.
                 0 => 90.0 * (random.next() * 4.0).floor() + 0.4526,
                 _ => random.between(0.0, 360.0),
             };
-            (ray(Point::new(east, north, up), azimuth_deg, down_deg), range)
+            (
+                ray(Point::new(east, north, up), azimuth_deg, down_deg),
+                range,
+            )
         })
         .collect()
 }
@@ -189,7 +234,10 @@ fn rugged_ground_is_met_where_a_slow_march_meets_it() {
 
 #[test]
 fn coarse_posts_are_met_where_a_slow_march_meets_them() {
-    let terrain = terrain(vec![utm_grid(21, 25.0, |x, y| rugged(x / 10.0, y / 10.0))], None);
+    let terrain = terrain(
+        vec![utm_grid(21, 25.0, |x, y| rugged(x / 10.0, y / 10.0))],
+        None,
+    );
     let counts = compare(&terrain, rays(&terrain, 3000, 2, 240.0).into_iter(), 1.0);
     assert!(counts[0] > 500, "{counts:?}");
 }
@@ -198,8 +246,13 @@ fn coarse_posts_are_met_where_a_slow_march_meets_them() {
 fn holes_are_passed_where_the_rule_says_so() {
     let holed = |x: f64, y: f64| {
         let hole = (x - 5.0).hypot(y - 5.0) < 4.0 || (x + 10.0).abs() < 1.5 && y.abs() < 12.0;
-        let speck = (x.rem_euclid(17.0) - 3.0).abs() < 0.6 && (y.rem_euclid(13.0) - 3.0).abs() < 0.6;
-        if hole || speck { f64::NAN } else { rugged(x, y) }
+        let speck =
+            (x.rem_euclid(17.0) - 3.0).abs() < 0.6 && (y.rem_euclid(13.0) - 3.0).abs() < 0.6;
+        if hole || speck {
+            f64::NAN
+        } else {
+            rugged(x, y)
+        }
     };
     let terrain = terrain(vec![utm_grid(81, 1.0, holed)], None);
     let counts = compare(&terrain, rays(&terrain, 3000, 3, 45.0).into_iter(), 0.02);
@@ -208,8 +261,20 @@ fn holes_are_passed_where_the_rule_says_so() {
 
 #[test]
 fn several_rasters_and_the_height_outside_are_one_surface() {
-    let fine = utm_grid(61, 0.25, |x, y| if x > y + 3.0 { f64::NAN } else { rugged(x, y) + 0.2 });
-    let coarse = utm_grid(17, 2.0, |x, y| if x.hypot(y - 9.0) < 4.0 { f64::NAN } else { rugged(x, y) });
+    let fine = utm_grid(61, 0.25, |x, y| {
+        if x > y + 3.0 {
+            f64::NAN
+        } else {
+            rugged(x, y) + 0.2
+        }
+    });
+    let coarse = utm_grid(17, 2.0, |x, y| {
+        if x.hypot(y - 9.0) < 4.0 {
+            f64::NAN
+        } else {
+            rugged(x, y)
+        }
+    });
     let map = Affine {
         x0: 8.3997,
         x_column: 1.1e-5,
@@ -218,7 +283,9 @@ fn several_rasters_and_the_height_outside_are_one_surface() {
         y_column: 2e-6,
         y_row: -8e-6,
     };
-    let heights = (0..60 * 60u32).map(|i| 115.0 + f64::from(i * 7919 % 13) * 0.05).collect();
+    let heights = (0..60 * 60u32)
+        .map(|i| 115.0 + f64::from(i * 7919 % 13) * 0.05)
+        .collect();
     let turned = HeightGrid::new(60, 60, Posts::F64(heights), map, "EPSG:4326").unwrap();
     let grids = vec![fine, coarse, turned];
     for (outside_m, seed) in [(Some(114.8), 4), (Some(115.6), 5)] {

@@ -62,12 +62,18 @@ fn the_height_at_a_place_is_that_between_its_posts() {
     let at = |dx: f64, dy: f64| {
         let utm = Crs::new(UTM, Planet::EARTH).unwrap();
         let (lon, lat) = utm.lon_lat(x + dx, y + dy).unwrap();
-        let point = site().enu(Geodetic { lat, lon, height_m: 50.0 });
-        terrain.ground_at(point.xyz.x, point.xyz.y).map(|ground| site().height_m(ground.point))
+        let point = site().enu(Geodetic {
+            lat,
+            lon,
+            height_m: 50.0,
+        });
+        terrain
+            .ground_at(point.xyz.x, point.xyz.y)
+            .map(|ground| site().height_m(ground.point))
     };
     for (dx, dy, expected) in [
-        (0.0, 0.0, 50.0),  // the mean of the four
-        (0.0, 0.5, 35.0),  // 3/4 of (10 + 30) / 2 and 1/4 of (50 + 110) / 2
+        (0.0, 0.0, 50.0),    // the mean of the four
+        (0.0, 0.5, 35.0),    // 3/4 of (10 + 30) / 2 and 1/4 of (50 + 110) / 2
         (-0.5, -0.5, 51.25), // (3/16) 10 + (1/16) 30 + (9/16) 50 + (3/16) 110
     ] {
         let found = at(dx, dy).unwrap();
@@ -87,8 +93,13 @@ fn the_normal_leans_away_from_the_slope() {
     // UTM's scale at 0.6 degrees from its meridian.
     let slope = 0.5 * 0.999_623_6;
     let expected = Vector3::new(-slope * convergence.cos(), slope * convergence.sin(), 1.0);
-    assert!((normal - expected.normalize()).norm() < 1e-5, "{normal} {expected}");
-    let hit = terrain.first_hit(ray(Point::new(0.0, 0.0, 5.0), 0.0, 90.0), 10.0).unwrap();
+    assert!(
+        (normal - expected.normalize()).norm() < 1e-5,
+        "{normal} {expected}"
+    );
+    let hit = terrain
+        .first_hit(ray(Point::new(0.0, 0.0, 5.0), 0.0, 90.0), 10.0)
+        .unwrap();
     assert!((hit.normal.xyz() - normal).norm() < 1e-9);
     assert!((hit.distance_m - 5.0).abs() < 1e-6);
 }
@@ -101,7 +112,11 @@ fn rasters_in_metres_and_in_degrees_are_one_surface() {
     let (x, y) = utm_origin();
     let metres = utm_grid(201, 1.0, |dx, dy| {
         let (lon, lat) = utm.lon_lat(x + dx, y + dy).unwrap();
-        plane(Geodetic { lat, lon, height_m: 0.0 })
+        plane(Geodetic {
+            lat,
+            lon,
+            height_m: 0.0,
+        })
     });
     for turn in [0.0, 360.0, -360.0] {
         let map = Affine {
@@ -117,10 +132,16 @@ fn rasters_in_metres_and_in_degrees_are_one_surface() {
             .map(|(lon, lat)| plane(Geodetic::from_degrees(lat, lon, 0.0)))
             .collect();
         let degrees = HeightGrid::new(201, 201, Posts::F64(heights), map, "EPSG:4326").unwrap();
-        let (a, b) = (terrain(vec![metres.clone()], None), terrain(vec![degrees], None));
+        let (a, b) = (
+            terrain(vec![metres.clone()], None),
+            terrain(vec![degrees], None),
+        );
         for azimuth in 0..72 {
             let ray = ray(Point::new(1.0, 2.0, 3.0), 5.0 * f64::from(azimuth), 12.0);
-            let (hit_a, hit_b) = (a.first_hit(ray, 80.0).unwrap(), b.first_hit(ray, 80.0).unwrap());
+            let (hit_a, hit_b) = (
+                a.first_hit(ray, 80.0).unwrap(),
+                b.first_hit(ray, 80.0).unwrap(),
+            );
             assert!(hit_a.point.distance(hit_b.point) < 1e-3);
             assert!((hit_a.normal.xyz() - hit_b.normal.xyz()).norm() < 1e-4);
         }
@@ -129,7 +150,11 @@ fn rasters_in_metres_and_in_degrees_are_one_surface() {
 
 #[test]
 fn earlier_rasters_count_and_later_ones_show_through_their_holes() {
-    let first = utm_grid(11, 1.0, |x, y| if x.hypot(y) < 1.5 { f64::NAN } else { 116.0 });
+    let first = utm_grid(
+        11,
+        1.0,
+        |x, y| if x.hypot(y) < 1.5 { f64::NAN } else { 116.0 },
+    );
     let second = utm_grid(41, 1.0, |_, _| 115.5);
     let both = vec![first, second];
     let height = |terrain: &Terrain, east: f64| {
@@ -187,7 +212,9 @@ fn over_a_hole_a_ray_passes_above_its_rim_only() {
     assert_eq!(hit(0.0, 2.0, 40.0), Err(Miss::OffTerrain)); // from within, into the hole
     let filled = super::Terrain::from_grids(site(), vec![utm_grid(41, 1.0, rim)], Some(114.0));
     let filled = filled.unwrap();
-    let at = filled.first_hit(ray(Point::new(0.0, 0.0, 2.0), 0.0, 90.0), 1.0).unwrap();
+    let at = filled
+        .first_hit(ray(Point::new(0.0, 0.0, 2.0), 0.0, 90.0), 1.0)
+        .unwrap();
     assert!((at.distance_m - 3.0).abs() < 1e-6);
 }
 
@@ -213,7 +240,9 @@ fn distances_to_the_model_are_to_its_edge() {
     assert_eq!(terrain.distance_to(Point::new(5.0, -19.0, 3.0)), 0.0);
     let away = terrain.distance_to(Point::new(120.0, 0.0, 3.0));
     assert!((away - 100.0).abs() < 0.3, "{away}"); // the raster is turned by 0.45 degrees
-    assert!(terrain.covers(Point::new(5.0, -19.0, 3.0)) && !terrain.covers(Point::new(25.0, 0.0, 0.0)));
+    assert!(
+        terrain.covers(Point::new(5.0, -19.0, 3.0)) && !terrain.covers(Point::new(25.0, 0.0, 0.0))
+    );
     let plane = Terrain::constant_height(site(), 115.0);
     assert_eq!(plane.distance_to(Point::new(9e3, 0.0, 0.0)), 0.0);
 }
@@ -239,7 +268,10 @@ fn a_model_far_larger_than_the_site_is_cut_to_it() {
     let grid = HeightGrid::new(361, 181, Posts::F64(heights), map, "IAU_2015:49900").unwrap();
     let terrain = Terrain::from_grids(there, vec![grid], None).unwrap();
     let up = terrain.ground_at(0.0, 0.0).unwrap().point.xyz.z;
-    assert!((up - 185.0).abs() < 1e-6, "east of 180 by the raster, west by the site");
+    assert!(
+        (up - 185.0).abs() < 1e-6,
+        "east of 180 by the raster, west by the site"
+    );
 }
 
 #[test]
