@@ -60,14 +60,14 @@ impl Ground {
         self.base_m
             + self.slope[0] * east_m
             + self.slope[1] * north_m
-            + self.rough.at(east_m, north_m).0
+            + self.rough.height_m(east_m, north_m)
     }
 
     /// The height the model of the run gives there: with its error, or the surface of constant
     /// height where the run is given nothing better.
     pub fn model_height_m(&self, east_m: f64, north_m: f64) -> f64 {
         if self.model_follows {
-            self.height_m(east_m, north_m) + self.model_error.at(east_m, north_m).0
+            self.height_m(east_m, north_m) + self.model_error.height_m(east_m, north_m)
         } else {
             self.base_m
         }

@@ -10,8 +10,9 @@ use crate::pose::PoseSigma;
 
 use super::diameters::DiameterLaw;
 use super::scene::{
-    Area, Border, Clusters, Detector, GroundPlan, Occlusion, Palette, Path, PictureFormat,
-    Platform, PoseKey, PosePlan, RenderPlan, RockPlan, Scene, ScoreLaw, TerrainModel,
+    Area, Border, BoxExtent, Clusters, Detector, GroundPlan, Occlusion, Palette, Path,
+    PictureFormat, Platform, PoseKey, PosePlan, RenderPlan, RockPlan, Scene, ScoreLaw,
+    TerrainModel,
 };
 use super::scene_cameras::cameras;
 
@@ -443,6 +444,10 @@ fn detector(section: Section) -> Detector {
         occlusion: Occlusion {
             rocks: section.boolean("rocks_hide").unwrap_or(false),
             ground: section.boolean("ground_hides").unwrap_or(false),
+        },
+        extent: match section.word("box", &["body", "visible"]).as_deref() {
+            Some("visible") => BoxExtent::Visible,
+            _ => BoxExtent::Body,
         },
         border: match section.word("border", &["keep", "clip", "drop"]).as_deref() {
             Some("clip") => Border::Clip,

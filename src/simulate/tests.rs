@@ -130,7 +130,13 @@ fn boxes_fall_on_true_rocks_in_every_scene() {
             let u = f * p.x / p.z + 0.5 * (f64::from(camera.width) - 1.0);
             let v = f * p.y / p.z + 0.5 * (f64::from(camera.height) - 1.0);
             let [x_min, y_min, x_max, y_max] = detection.edges_px;
-            let error = [0.5 * (x_min + x_max) - u, 0.5 * (y_min + y_max) - v];
+            let seen = appearance(
+                camera,
+                &view.enu_from_camera(&scene),
+                &simulation.rocks[rock],
+            );
+            let aim = seen.unwrap().aim(scene.detector.extent);
+            let error = [0.5 * (x_min + x_max) - u, y_min + aim * (y_max - y_min) - v];
             squares += error.iter().map(|e| e * e).sum::<f64>() / detection.sigma_px.powi(2);
             number += 2.0;
         }
@@ -312,6 +318,7 @@ fn the_files_say_what_the_formats_mean() {
     scene.render = None;
     scene.poses.key = PoseKey::Image;
     scene.detector.pixel_px = 0.0;
+    scene.detector.extent = BoxExtent::Body;
     let simulation = simulate(&scene);
     let folder = tempfile::tempdir().unwrap();
     write(&simulation, folder.path()).unwrap();
@@ -427,8 +434,10 @@ fn a_rendered_rock_fills_its_box() {
         largest = largest.max((left - (seen.centre.u - half)).abs());
         largest = largest.max((right - (seen.centre.u + half)).abs());
         let top = of_rock.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-        let share = (seen.centre.v - top) / (0.5 * seen.height_px);
+        let share = (seen.centre.v - top) / seen.above_px;
         assert!((0.7..1.03).contains(&share), "{share}");
+        let bottom = of_rock.iter().map(|p| p.1).fold(0.0, f64::max) + 0.5;
+        assert!((bottom - seen.centre.v - seen.below_px).abs() <= 1.5);
         assert!(seen.width_px > 40.0);
     }
     assert!(largest <= 1.0, "{largest}");
