@@ -39,9 +39,9 @@ impl Holes {
         }
         let mut highest = vec![f64::NEG_INFINITY; runs.len()];
         for row in 0..rows.len() - 1 {
-            for index in rows[row]..rows[row + 1] {
+            let own = rows[row]..rows[row + 1];
+            for (index, run) in own.clone().zip(&runs[own]) {
                 let root = root(&mut parent, index);
-                let run = runs[index];
                 for post_row in [row, row + 1] {
                     for column in run.first..=run.last + 1 {
                         // `max` passes over the NaN of unknown posts.

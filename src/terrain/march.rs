@@ -80,12 +80,13 @@ pub(super) fn first_hit(
     let far = max_ground_range_m / step[0].hypot(step[1]);
     let far = if far.is_nan() { f64::INFINITY } else { far };
     let top = first_not_above(site, ray, model.top_m, 0.0).ok_or(Miss::AboveHorizon)?;
+    let bounds = model.within_bounds(ray.origin, step);
     if top > far {
-        return Err(Miss::TooFar);
+        let leave = bounds.map_or(0.0, |(_, leave)| leave);
+        return Err(march.after(leave.min(far), far));
     }
     let start = march.begin(top);
-    let (enter, leave) = model
-        .within_bounds(ray.origin, step)
+    let (enter, leave) = bounds
         .filter(|&(enter, leave)| leave > start && enter < far)
         .map_or((start, start), |(a, b)| (a.max(start), b.min(far)));
     match march.run(start, (enter, leave), far) {
@@ -120,8 +121,8 @@ impl March<'_> {
             if place.height_m > self.model.top_m && slope >= 0.0 {
                 return Break(Err(Miss::AboveHorizon));
             }
-            // Known ground would have been hit by now.
-            if self.model.outside_m.is_none() && place.height_m < self.model.bottom_m {
+            // Wherever it comes to known ground, it will be below it.
+            if self.passed == Passed::Unknown && place.height_m < self.model.bottom_m {
                 return Break(Err(Miss::OffTerrain));
             }
             let next = (t + self.model.leg_m).min(leave);
@@ -152,11 +153,22 @@ impl March<'_> {
         self.outside(outside_m, from, to)
     }
 
-    /// Why there is no hit on a ray that has left the rasters at `from`.
+    /// Why there is no hit on a ray that has left the rasters, or come to the end of its range, at
+    /// `from`.
     fn after(&self, from: f64, far: f64) -> Miss {
-        match first_not_above(self.site, self.ray, self.model.top_m, from) {
+        if self.passed == Passed::Unknown {
+            let rises = self.slope(self.site.geodetic(self.ray.at(from))) >= 0.0;
+            return if rises {
+                Miss::AboveHorizon
+            } else {
+                Miss::OffTerrain
+            };
+        }
+        let (outside_m, top_m) = (self.model.outside_m, self.model.top_m);
+        let highest_m = outside_m.filter(|_| from < far).unwrap_or(top_m);
+        match first_not_above(self.site, self.ray, highest_m, from) {
             None => Miss::AboveHorizon,
-            Some(t) if t >= far || self.model.outside_m.is_some() => Miss::TooFar,
+            Some(t) if t >= far || outside_m.is_some() => Miss::TooFar,
             Some(_) => Miss::OffTerrain,
         }
     }
@@ -188,6 +200,7 @@ impl March<'_> {
         (step[0].hypot(step[1]) < tile.half_turn).then_some(Line {
             start,
             step,
+            bend,
             slack_m: SLACK_M + 4.0 * tile.step_m * bend,
         })
     }

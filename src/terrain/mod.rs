@@ -5,7 +5,8 @@
 //!
 //! - The height at a place is the bilinear interpolation of the four posts around it, in the
 //!   raster's own columns and rows. Beyond the outermost posts a raster says nothing, and neither in
-//!   a cell with an unknown post (a hole).
+//!   a cell with an unknown post (a hole). Rasters cut from one along the borders of its pixels are
+//!   joined again first.
 //! - Of several rasters the first in the list that knows a place counts. Where none does, the
 //!   constant height given for outside holds, and where none is given the ground is unknown.
 //! - Where surfaces of different height meet, the step between them is a wall and can be hit.
@@ -23,6 +24,7 @@ mod holes;
 mod leg;
 mod march;
 mod model;
+mod mosaic;
 mod patch;
 mod pyramid;
 mod tile;
@@ -127,11 +129,11 @@ impl Terrain {
         let terrain = Self::from_grids(site, grids, outside_m)
             .map_err(|(number, error)| Fault::new(in_file(number), "crs", error.to_string()))?;
         if let Shape::Model(model) = &terrain.shape {
-            for (number, tile) in model.tiles.iter().enumerate() {
+            for tile in &model.tiles {
                 let away = tile.distance_m(&site, Point::origin());
                 if away.is_none_or(|away| away > Site::REACH_M) {
                     faults.push(Fault::found(
-                        in_file(number),
+                        in_file(tile.number),
                         "",
                         format!("a model {} the site's origin", far_from(away)),
                         format!("one within {:.0} km", Site::REACH_M / 1000.0),
@@ -169,8 +171,8 @@ impl Terrain {
     }
 
     /// The ground on the vertical line of the ENU frame at an east and a north, metres; `None`
-    /// where it is unknown. On a place-dependent surface far from the site's origin, where that line
-    /// leans against the local vertical, it is found by fixed-point steps to 1e-9 m.
+    /// where it is unknown. Far from the site's origin that line leans against the local vertical; the
+    /// place is found by fixed-point steps, to 1e-9 m.
     pub fn ground_at(&self, east_m: f64, north_m: f64) -> Option<Ground> {
         let mut up = 0.0;
         for _ in 0..50 {

@@ -1,8 +1,9 @@
 //! Several rasters as one surface, with a constant height around and beneath them.
 
-use crate::frame::{CrsError, Direction, Enu, Geodetic, Point, Site};
+use crate::frame::{Crs, CrsError, Direction, Enu, Geodetic, Point, Site};
 
 use super::grid::HeightGrid;
+use super::mosaic;
 use super::patch::Patch;
 use super::tile::Tile;
 
@@ -55,11 +56,16 @@ impl Model {
         grids: Vec<HeightGrid>,
         outside_m: Option<f64>,
     ) -> Result<Self, (usize, CrsError)> {
+        for (number, grid) in grids.iter().enumerate() {
+            Crs::new(grid.crs(), site.planet()).map_err(|error| (number, error))?;
+        }
+        let grids = mosaic::join(grids);
         let mut tiles = Vec::with_capacity(grids.len());
         // What shows through a raster's holes are the later ones, so they are made first.
         let mut under_holes_m = outside_m.unwrap_or(f64::NEG_INFINITY);
-        for (number, grid) in grids.into_iter().enumerate().rev() {
-            let tile = Tile::new(site, grid, under_holes_m).map_err(|error| (number, error))?;
+        for (number, grid) in grids.into_iter().rev() {
+            let tile = Tile::new(site, number, grid, under_holes_m);
+            let tile = tile.map_err(|error| (number, error))?;
             under_holes_m = under_holes_m.max(tile.top_m);
             tiles.push(tile);
         }

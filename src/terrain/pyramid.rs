@@ -111,13 +111,11 @@ mod tests {
 
     #[test]
     fn every_block_is_as_high_as_its_highest_post() {
-        let (columns, rows) = (13, 6);
-        let heights: Vec<f64> = (0..columns * rows)
+        let heights: Vec<f64> = (0..13 * 6)
             .map(|i| f64::from(i * 7919 % 101) + 0.123_456_789)
             .collect();
         let map = Affine::north_up(0.0, 0.0, 1.0);
-        let size = (columns as usize, rows as usize);
-        let grid = HeightGrid::new(size.0, size.1, Posts::F64(heights), map, "EPSG:32632").unwrap();
+        let grid = HeightGrid::new(13, 6, Posts::F64(heights), map, "EPSG:32632").unwrap();
         let pyramid = Pyramid::new(&grid, &Holes::new(&grid), f64::NEG_INFINITY);
         assert_eq!(pyramid.levels(), 4);
         for level in 1..=pyramid.levels() {

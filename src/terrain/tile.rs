@@ -17,6 +17,8 @@ const EDGE: f64 = 1e-7;
 /// A raster, the way from a place to its posts, and what rays need to pass over it fast.
 #[derive(Debug)]
 pub(super) struct Tile {
+    /// Of the raster in the list given, or of the first of those it was joined from.
+    pub number: usize,
     grid: HeightGrid,
     crs: Crs,
     post_from_crs: Affine,
@@ -41,7 +43,12 @@ impl Tile {
     ///
     /// # Errors
     /// [`CrsError`] where PROJ does not know the raster's CRS on the site's planet.
-    pub fn new(site: &Site, grid: HeightGrid, under_holes_m: f64) -> Result<Self, CrsError> {
+    pub fn new(
+        site: &Site,
+        number: usize,
+        grid: HeightGrid,
+        under_holes_m: f64,
+    ) -> Result<Self, CrsError> {
         let crs = Crs::new(grid.crs(), site.planet())?;
         let middle_deg = middle_longitude_deg(site, &crs, &grid);
         let grid = crop(site, &crs, middle_deg, grid);
@@ -54,6 +61,7 @@ impl Tile {
         let pyramid = Pyramid::new(&grid, &holes, under_holes_m);
         let (bottom_m, top_m, step_m) = extremes(&grid);
         let mut tile = Self {
+            number,
             grid,
             crs,
             post_from_crs,
@@ -98,7 +106,6 @@ impl Tile {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
         reason = "the position is checked to lie on the raster"
     )]
     pub fn cell(&self, position: [f64; 2]) -> Option<[usize; 2]> {
@@ -178,7 +185,6 @@ impl Tile {
     }
 
     /// An upper bound, by samples, of the second derivative of column and row along straight lines.
-    #[expect(clippy::cast_precision_loss, reason = "rasters have under 2^53 posts")]
     fn greatest_bend(&self, site: &Site) -> f64 {
         const STEP_M: f64 = 100.0;
         let radius = site.planet().ellipsoid.a;

@@ -5,5 +5,8 @@ mod projection;
 mod read;
 mod write;
 
+#[cfg(test)]
+mod tests;
+
 pub use read::read_geotiff;
 pub use write::write_geotiff;

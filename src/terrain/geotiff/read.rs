@@ -134,6 +134,17 @@ fn check_image(reader: &mut Reader, size: u64) -> Result<(u32, u32), Problem> {
             "1, a band of heights",
         ));
     }
+    // Uncompressed, LZW, deflate by its two codes, PackBits.
+    let compression = reader
+        .find_tag_unsigned::<u16>(Tag::Compression)?
+        .unwrap_or(1);
+    if ![1, 5, 8, 32773, 32946].contains(&compression) {
+        return Err(Problem::found(
+            "Compression",
+            format!("method {compression}"),
+            "1 (none), 5 (LZW), 8 (deflate) or 32773 (PackBits)",
+        ));
+    }
     // The decoder would turn the heights upside down.
     let shown = reader.find_tag_unsigned::<u16>(Tag::PhotometricInterpretation)?;
     if shown == Some(PhotometricInterpretation::WhiteIsZero.to_u16()) {

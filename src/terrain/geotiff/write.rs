@@ -20,7 +20,7 @@ use super::keys::{
     PROJ_LINEAR_UNITS, PROJECTED_TYPE, RASTER_TYPE, USER_DEFINED,
 };
 
-/// Files of more than this many bytes of heights are written as BigTIFF.
+/// Files of more than this many bytes of heights are written as `BigTIFF`.
 const LARGEST_CLASSIC: u64 = 3 << 30;
 
 /// Writes a height model: one band in the precision it is held in, deflated, posts at the centres
@@ -185,8 +185,8 @@ impl Keys {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "rasters have under 2^53 posts")]
 /// Whether a raster's CRS is in longitude and latitude: whether its coordinates are those.
+#[expect(clippy::cast_precision_loss, reason = "rasters have under 2^53 posts")]
 fn in_degrees(crs: &Crs, grid: &HeightGrid) -> bool {
     let near = |a: f64, b: f64| {
         let turn = (a - b).rem_euclid(360.0);

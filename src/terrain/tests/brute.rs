@@ -65,15 +65,31 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
     let (mut known, mut started) = (false, false);
     loop {
         let (height, over) = above(terrain, ray, t);
+        let rises = site().up(site().geodetic(ray.at(t))).xyz().dot(&direction) > 0.0;
+        if !known
+            && over.is_none()
+            && height <= model.top_m
+            && (t > far || height < model.bottom_m || t > 1000.0)
+        {
+            return Err(if rises {
+                Miss::AboveHorizon
+            } else {
+                Miss::OffTerrain
+            });
+        }
         if t > far {
-            let top = constant::first_not_above(&site(), ray, model.top_m, far);
-            return Err(if top.is_none() {
+            // Beyond all rasters the height outside is all that can be met.
+            let left = model
+                .within_bounds(ray.origin, [direction.x, direction.y])
+                .is_none_or(|(_, leave)| leave < far);
+            let highest = model.outside_m.filter(|_| left).unwrap_or(model.top_m);
+            let later = constant::first_not_above(&site(), ray, highest, far);
+            return Err(if later.is_none() {
                 Miss::AboveHorizon
             } else {
                 Miss::TooFar
             });
         }
-        let rises = site().up(site().geodetic(ray.at(t))).xyz().dot(&direction) > 0.0;
         let step = match over {
             Some(over) if over <= 0.0 => {
                 return match (started, known) {
@@ -95,9 +111,6 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
         };
         if height > model.top_m && rises {
             return Err(Miss::AboveHorizon);
-        }
-        if !known && (height < model.bottom_m || t > 1000.0) {
-            return Err(Miss::OffTerrain);
         }
         started = true;
         before = t;
@@ -164,9 +177,19 @@ fn agree(
                     && above(terrain, ray, a)
                         .1
                         .is_some_and(|over| over.abs() < 1e-8))
+                || (a < b && met(terrain, ray, a))
         }
+        // The march has stepped over the tip of a ridge or the corner of a wall: the hit before
+        // where it ended is one by exact evaluation.
+        (Ok(a), Err(Miss::OffTerrain | Miss::TooFar | Miss::AboveHorizon)) => met(terrain, ray, a),
         (a, b) => a == b,
     }
+}
+
+/// Whether the ray goes under the ground at `t`, by exact evaluation.
+fn met(terrain: &Terrain, ray: Ray<Enu>, t: f64) -> bool {
+    let over = |t: f64| above(terrain, ray, t).1;
+    over(t - 1e-7).is_none_or(|over| over > 0.0) && over(t + 1e-7).is_some_and(|over| over <= 0.0)
 }
 
 /// Ridges, saw teeth, a wall of 3 m in one cell and a pit.

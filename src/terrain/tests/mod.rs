@@ -72,9 +72,9 @@ fn the_height_at_a_place_is_that_between_its_posts() {
             .map(|ground| site().height_m(ground.point))
     };
     for (dx, dy, expected) in [
-        (0.0, 0.0, 50.0),    // the mean of the four
-        (0.0, 0.5, 35.0),    // 3/4 of (10 + 30) / 2 and 1/4 of (50 + 110) / 2
-        (-0.5, -0.5, 51.25), // (3/16) 10 + (1/16) 30 + (9/16) 50 + (3/16) 110
+        (0.0, 0.0, 50.0),   // the mean of the four
+        (0.0, 0.5, 35.0),   // 3/4 of (10 + 30) / 2 and 1/4 of (50 + 110) / 2
+        (-0.5, -0.5, 52.5), // (3/16) 10 + (1/16) 30 + (9/16) 50 + (3/16) 110
     ] {
         let found = at(dx, dy).unwrap();
         // The vertical of the site's frame is that of its origin: the tilt over 1 m is 1e-7, and
@@ -155,7 +155,7 @@ fn earlier_rasters_count_and_later_ones_show_through_their_holes() {
         1.0,
         |x, y| if x.hypot(y) < 1.5 { f64::NAN } else { 116.0 },
     );
-    let second = utm_grid(41, 1.0, |_, _| 115.5);
+    let second = utm_grid(21, 2.0, |_, _| 115.5);
     let both = vec![first, second];
     let height = |terrain: &Terrain, east: f64| {
         let ground = terrain.ground_at(east, 0.0)?;
@@ -172,6 +172,23 @@ fn earlier_rasters_count_and_later_ones_show_through_their_holes() {
     let across = ray(Point::new(10.0, 0.0, 0.8), 270.0, 0.0);
     let hit = open.first_hit(across, 100.0).unwrap();
     assert!((hit.point.xyz.x - 5.0).abs() < 0.1, "{hit:?}");
+}
+
+#[test]
+fn a_model_in_pieces_is_the_whole() {
+    let whole = utm_grid(41, 1.0, hill);
+    let pieces = vec![
+        whole.window((0, 15), (0, 20)),
+        whole.window((16, 40), (0, 20)),
+        whole.window((0, 15), (21, 40)),
+        whole.window((16, 40), (21, 40)),
+    ];
+    let (whole, pieces) = (terrain(vec![whole], None), terrain(pieces, None));
+    for azimuth in 0..90 {
+        let ray = ray(Point::new(-6.0, 3.0, 5.0), 4.0 * f64::from(azimuth), 35.0);
+        let (a, b) = (whole.first_hit(ray, 30.0), pieces.first_hit(ray, 30.0));
+        assert!(a.unwrap().point.distance(b.unwrap().point) < 1e-6);
+    }
 }
 
 #[test]

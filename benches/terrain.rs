@@ -1,0 +1,81 @@
+//! First hits a second, one thread: constant height, and a model of 1000 x 1000 posts.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use rockmap::frame::{Crs, Direction, Enu, Geodetic, Planet, Point, Ray, Site};
+use rockmap::terrain::{Affine, HeightGrid, Posts, Terrain};
+
+const RAYS: u32 = 1000;
+
+fn site() -> Site {
+    Site::new(Planet::EARTH, Geodetic::from_degrees(49.0, 8.4, 115.0))
+}
+
+/// Half a metre between posts, hills of two metres with half a metre of roughness.
+fn model() -> Terrain {
+    let origin = site().origin();
+    let utm = Crs::new("EPSG:32632", Planet::EARTH).expect("PROJ knows UTM");
+    let (x, y) = utm
+        .xy(origin.lon, origin.lat)
+        .expect("the site is in the zone");
+    let heights = (0..1_000_000u32)
+        .map(|i| (f64::from(i % 1000), f64::from(i / 1000)))
+        .map(|(c, r)| {
+            let hills = (c / 30.0).sin() * (r / 40.0).cos();
+            115.0 + 2.0 * hills + 0.25 * (0.7 * c + 0.3 * r).sin() * (0.2 * c - 0.9 * r).cos()
+        })
+        .collect();
+    let map = Affine::north_up(x - 250.0, y + 250.0, 0.5);
+    let grid = HeightGrid::new(1000, 1000, Posts::F64(heights), map, "EPSG:32632");
+    Terrain::from_grids(site(), vec![grid.expect("a raster")], None).expect("a model")
+}
+
+/// Rays from 1.8 m above the ground at places spread over the middle of the model.
+fn rays(terrain: &Terrain, down_deg: f64, up_m: f64) -> Vec<Ray<Enu>> {
+    (0..RAYS)
+        .map(|i| {
+            let share = |step: f64| (f64::from(i) * step).fract() * 2.0 - 1.0;
+            let (east, north) = (80.0 * share(0.618_034), 80.0 * share(0.754_878));
+            let ground = terrain
+                .ground_at(east, north)
+                .expect("the middle is known")
+                .point;
+            let (sin, cos) = (360.0 * share(0.569_840)).to_radians().sin_cos();
+            let down = down_deg.to_radians();
+            let xyz = nalgebra::Vector3::new(sin * down.cos(), cos * down.cos(), -down.sin());
+            Ray {
+                origin: Point::new(east, north, ground.xyz.z + up_m),
+                direction: Direction::new(xyz).expect("a direction"),
+            }
+        })
+        .collect()
+}
+
+fn first_hits(c: &mut Criterion) {
+    let plane = Terrain::constant_height(site(), 115.0);
+    let model = model();
+    let mut group = c.benchmark_group("first_hit");
+    group.throughput(Throughput::Elements(u64::from(RAYS)));
+    for (name, terrain, down_deg, up_m, range_m) in [
+        ("constant height, 14 m away", &plane, 7.3, 1.8, 50.0),
+        ("model, straight down", &model, 90.0, 1.8, 50.0),
+        ("model, 25 degrees down", &model, 25.0, 1.8, 50.0),
+        ("model, 7.3 degrees down (14 m)", &model, 7.3, 1.8, 14.0),
+        ("model, grazing to 150 m", &model, 0.5, 1.8, 150.0),
+        ("model, from 60 m above", &model, 40.0, 60.0, 500.0),
+    ] {
+        let rays = rays(terrain, down_deg, up_m);
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                rays.iter()
+                    .filter(|&&ray| terrain.first_hit(black_box(ray), range_m).is_ok())
+                    .count()
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, first_hits);
+criterion_main!(benches);
