@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2};
 
-use super::perspective::{direction_of_plane, plane_of_point};
+use super::perspective::{direction_of_plane, plane_of_point, product};
 use super::radial::Radial;
 use super::sensor::Sensor;
 use super::{BadLens, Intrinsics, LensError, central_ray};
@@ -98,7 +98,7 @@ impl BrownConrady {
             self.radial.undistort(distorted)?
         };
         let (direction, by_plane) = direction_of_plane(plane);
-        let jacobian = by_plane * by_distorted * distorted_by_pixel;
+        let jacobian = product(&by_plane, &product(&by_distorted, &distorted_by_pixel));
         Ok((central_ray(direction), jacobian))
     }
 
@@ -114,7 +114,10 @@ impl BrownConrady {
             return Err(LensError::OutsideField);
         }
         let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
-        Ok((pixel, by_distorted * by_plane * by_point))
+        Ok((
+            pixel,
+            product(&product(&by_distorted, &by_plane), &by_point),
+        ))
     }
 
     /// The distorted place of a place on the plane at unit depth, and its derivative.
@@ -149,10 +152,14 @@ impl BrownConrady {
         let (seen, mut jacobian) = self.distort(place)?;
         let mut miss = distorted - seen;
         let enough = 4.0 * f64::EPSILON * (1.0 + distorted.norm());
+        // The error of a step is of the order of its square; a hundred covers the curvature.
+        let last = |step: Vector2<f64>, inverse: &Matrix2<f64>| {
+            100.0 * step.norm_squared() * inverse.norm() <= f64::EPSILON
+        };
         for _ in 0..60 {
             let inverse = upright_inverse(&jacobian)?;
-            let step = inverse * miss;
-            if miss.norm() <= enough {
+            let step = product(&inverse, &miss);
+            if miss.norm() <= enough || last(step, &inverse) {
                 return Ok((place + step, inverse));
             }
             let mut share = 1.0;
@@ -196,7 +203,7 @@ impl BrownConrady {
         if norm == 0.0 {
             return Ok(distorted);
         }
-        match self.radial.radius(norm) {
+        match self.radial.radius(norm, 1e-3) {
             Ok(radius) => Ok(distorted * (radius.min(0.999 * self.radial.limit()) / norm)),
             Err(LensError::OutsideField) if self.radial.limit().is_finite() => {
                 Ok(distorted * (0.999 * self.radial.limit() / norm))

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Vector3};
 
-use super::perspective::{direction_of_plane, plane_of_point};
+use super::perspective::{direction_of_plane, plane_of_point, product};
 use super::sensor::Sensor;
 use super::{BadLens, LensError, Mount, central_ray};
 use crate::frame::{self, Pixel, Point, Ray, RigidTransform, Rotation, Vector};
@@ -145,7 +145,7 @@ impl Cahv {
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
         let (plane, plane_by_pixel) = self.sensor.plane(pixel)?;
         let (direction, by_plane) = direction_of_plane(plane);
-        Ok((central_ray(direction), by_plane * plane_by_pixel))
+        Ok((central_ray(direction), product(&by_plane, &plane_by_pixel)))
     }
 
     #[inline]
@@ -155,7 +155,7 @@ impl Cahv {
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
         let (plane, by_point) = plane_of_point(point.xyz)?;
         let (pixel, by_plane) = self.sensor.pixel(plane)?;
-        Ok((pixel, by_plane * by_point))
+        Ok((pixel, product(&by_plane, &by_point)))
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2x3, Matrix3x2};
 
 use super::cahv::OpticalAxis;
-use super::perspective::{direction_of_plane, plane_of_point};
+use super::perspective::{direction_of_plane, plane_of_point, product};
 use super::radial::Radial;
 use super::sensor::Sensor;
 use super::{BadLens, Cahv, CahvVectors, LensError, Mount, central_ray};
@@ -71,8 +71,11 @@ impl Cahvor {
         let (plane, by_distorted) = self.radial.undistort(distorted)?;
         let (direction, by_plane) = direction_of_plane(plane);
         let turn = self.optical.lens_from_camera.transpose();
-        let jacobian = turn * (by_plane * by_distorted * distorted_by_pixel);
-        Ok((central_ray(turn * direction), jacobian))
+        let jacobian = product(
+            &product(&turn, &by_plane),
+            &product(&by_distorted, &distorted_by_pixel),
+        );
+        Ok((central_ray(product(&turn, &direction)), jacobian))
     }
 
     #[inline]
@@ -81,10 +84,16 @@ impl Cahvor {
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
         let turn = self.optical.lens_from_camera;
-        let (plane, by_point) = plane_of_point(turn * point.xyz)?;
+        let (plane, by_point) = plane_of_point(product(&turn, &point.xyz))?;
         let (distorted, by_plane) = self.radial.distort(plane)?;
         let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
-        Ok((pixel, by_distorted * by_plane * by_point * turn))
+        Ok((
+            pixel,
+            product(
+                &product(&by_distorted, &by_plane),
+                &product(&by_point, &turn),
+            ),
+        ))
     }
 }
 

@@ -6,7 +6,7 @@ use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
 use super::angle::{angle_jacobian, direction_of_angle};
 use super::cahv::OpticalAxis;
-use super::perspective::radial_jacobian;
+use super::perspective::{product, radial_jacobian};
 use super::radial::{Radial, increasing_root};
 use super::sensor::Sensor;
 use super::{BadLens, Cahv, CahvVectors, LensError, Mount};
@@ -152,11 +152,14 @@ impl Cahvore {
         let (direction, by_angle) = direction_of_angle(unit * theta);
         let turn = self.optical.lens_from_camera.transpose();
         let ray = Ray {
-            origin: Point::from_xyz(turn * Vector3::new(0.0, 0.0, self.pupil_shift(theta))),
-            direction: Direction::from_unit(turn * direction),
+            origin: Point::from_xyz(turn.column(2) * self.pupil_shift(theta)),
+            direction: Direction::from_unit(product(&turn, &direction)),
         };
-        let jacobian = by_angle * by_chi * by_distorted * distorted_by_pixel;
-        Ok((ray, turn * jacobian))
+        let jacobian = product(
+            &product(&by_angle, &by_chi),
+            &product(&by_distorted, &distorted_by_pixel),
+        );
+        Ok((ray, product(&turn, &jacobian)))
     }
 
     #[inline]
@@ -165,7 +168,7 @@ impl Cahvore {
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
         let turn = self.optical.lens_from_camera;
-        let (angle, by_point) = self.angle_vector(turn * point.xyz)?;
+        let (angle, by_point) = self.angle_vector(product(&turn, &point.xyz))?;
         let theta = angle.norm();
         let (chi, slope) = self.image(theta);
         let (unit, ratio) = if theta > 0.0 {
@@ -176,7 +179,10 @@ impl Cahvore {
         let by_angle = radial_jacobian(unit, slope, ratio);
         let (distorted, by_chi) = self.radial.distort(unit * chi)?;
         let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
-        let jacobian = by_distorted * by_chi * by_angle * by_point * turn;
+        let jacobian = product(
+            &product(&by_distorted, &product(&by_chi, &by_angle)),
+            &product(&by_point, &turn),
+        );
         Ok((pixel, jacobian))
     }
 

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2x3, Matrix3x2};
 
 use super::angle::{angle_of_point, direction_of_angle};
+use super::perspective::product;
 use super::radial::Radial;
 use super::sensor::Sensor;
 use super::{BadLens, Intrinsics, LensError, central_ray};
@@ -65,7 +66,7 @@ impl Fisheye {
         let (distorted, distorted_by_pixel) = self.sensor.plane(pixel)?;
         let (angle, by_distorted) = self.radial.undistort(distorted)?;
         let (direction, by_angle) = direction_of_angle(angle);
-        let jacobian = by_angle * by_distorted * distorted_by_pixel;
+        let jacobian = product(&by_angle, &product(&by_distorted, &distorted_by_pixel));
         Ok((central_ray(direction), jacobian))
     }
 
@@ -77,6 +78,9 @@ impl Fisheye {
         let (angle, by_point) = angle_of_point(point.xyz)?;
         let (distorted, by_angle) = self.radial.distort(angle)?;
         let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
-        Ok((pixel, by_distorted * by_angle * by_point))
+        Ok((
+            pixel,
+            product(&product(&by_distorted, &by_angle), &by_point),
+        ))
     }
 }

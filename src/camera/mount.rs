@@ -116,3 +116,62 @@ impl Mount {
         RigidTransform::new(turn * zero.rotation, centre)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::{Body, Camera};
+
+    fn forward(transform: RigidTransform<Body, Camera>) -> Vector3<f64> {
+        (transform.rotation * Vector::<Camera>::new(0.0, 0.0, 1.0)).xyz
+    }
+
+    #[test]
+    fn a_default_camera_looks_forward_upright() {
+        let axes = Mount::default().body_from_camera(PanTilt::default());
+        let seen = axes * Point::<Camera>::new(1.0, 2.0, 3.0); // 1 right, 2 down, 3 ahead
+        assert!(seen.distance(Point::new(3.0, -1.0, -2.0)) < 1e-15);
+    }
+
+    #[test]
+    fn pan_turns_right_and_tilt_up_about_the_pivot() {
+        // A camera 0.1 m ahead of its head's pivot, 2 m above the ground.
+        let mount = Mount::new(Vector::new(0.6, 0.0, 2.0), Mount::FORWARD)
+            .unwrap()
+            .with_pivot(Point::new(0.5, 0.0, 2.0));
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let right = mount.body_from_camera(PanTilt {
+            pan: quarter,
+            tilt: 0.0,
+        });
+        assert!((forward(right) - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-15);
+        assert!(right.origin().distance(Point::new(0.5, -0.1, 2.0)) < 1e-15);
+        let up = mount.body_from_camera(PanTilt {
+            pan: 0.0,
+            tilt: quarter,
+        });
+        assert!((forward(up) - Vector3::new(0.0, 0.0, 1.0)).norm() < 1e-15);
+        assert!(up.origin().distance(Point::new(0.5, 0.0, 2.1)) < 1e-15);
+        // To the right and then 30 degrees down: the tilt axis has turned with the pan.
+        let angles = PanTilt {
+            pan: quarter,
+            tilt: -quarter / 3.0,
+        };
+        let below = forward(mount.body_from_camera(angles));
+        assert!((below - Vector3::new(0.0, -0.75f64.sqrt(), -0.5)).norm() < 1e-15);
+        // The picture stays level: its right-hand side is still horizontal, towards the rear.
+        let side = mount.body_from_camera(angles).rotation * Vector::<Camera>::new(1.0, 0.0, 0.0);
+        assert!((side.xyz - Vector3::new(-1.0, 0.0, 0.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn without_a_pivot_the_centre_stays() {
+        let mount = Mount::new(Vector::new(0.6, -0.2, 2.0), [2.0, -2.0, 2.0, -2.0]).unwrap();
+        let turned = mount.body_from_camera(PanTilt {
+            pan: 0.3,
+            tilt: -0.4,
+        });
+        assert!(turned.origin().distance(Point::new(0.6, -0.2, 2.0)) < 1e-15);
+        assert!(Mount::new(Vector::new(0.0, 0.0, 0.0), [0.0; 4]).is_none());
+    }
+}

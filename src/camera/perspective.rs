@@ -1,6 +1,6 @@
 //! The plane at unit depth: points and directions in front of a camera as `(x / z, y / z)`.
 
-use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix, Vector2, Vector3};
 
 use super::LensError;
 
@@ -34,8 +34,15 @@ pub(super) fn plane_of_point(
 pub(super) fn direction_of_plane(plane: Vector2<f64>) -> (Vector3<f64>, Matrix3x2<f64>) {
     let inverse = 1.0 / (1.0 + plane.norm_squared()).sqrt();
     let unit = Vector3::new(plane.x, plane.y, 1.0) * inverse;
-    let along = unit * plane.transpose() * (inverse * inverse);
-    let jacobian = Matrix3x2::new(inverse, 0.0, 0.0, inverse, 0.0, 0.0) - along;
+    let bend = plane * (inverse * inverse);
+    let jacobian = Matrix3x2::new(
+        inverse - unit.x * bend.x,
+        -unit.x * bend.y,
+        -unit.y * bend.x,
+        inverse - unit.y * bend.y,
+        -unit.z * bend.x,
+        -unit.z * bend.y,
+    );
     (unit, jacobian)
 }
 
@@ -43,5 +50,34 @@ pub(super) fn direction_of_plane(plane: Vector2<f64>) -> (Vector3<f64>, Matrix3x
 /// `along` is the derivative of the new radius by the old one, `across` their ratio.
 #[inline]
 pub(super) fn radial_jacobian(unit: Vector2<f64>, along: f64, across: f64) -> Matrix2<f64> {
-    Matrix2::from_diagonal_element(across) + unit * unit.transpose() * (along - across)
+    let bend = unit * (along - across);
+    let mixed = unit.x * bend.y;
+    Matrix2::new(
+        across + unit.x * bend.x,
+        mixed,
+        mixed,
+        across + unit.y * bend.y,
+    )
+}
+
+/// The product of two small matrices, the chain rule's step.
+///
+/// The library's own product goes through memory element by element, and chains of it wait for the
+/// stores: most models run about twice as fast with this one.
+#[inline(always)]
+pub(super) fn product<const R: usize, const K: usize, const C: usize>(
+    a: &SMatrix<f64, R, K>,
+    b: &SMatrix<f64, K, C>,
+) -> SMatrix<f64, R, C> {
+    let mut product = SMatrix::<f64, R, C>::zeros();
+    for j in 0..C {
+        for i in 0..R {
+            let mut sum = 0.0;
+            for k in 0..K {
+                sum += a.data.0[k][i] * b.data.0[j][k];
+            }
+            product.data.0[j][i] = sum;
+        }
+    }
+    product
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2};
 
-use super::perspective::{direction_of_plane, plane_of_point};
+use super::perspective::{direction_of_plane, plane_of_point, product};
 use super::sensor::Sensor;
 use super::{BadLens, LensError, central_ray};
 use crate::frame::{self, Pixel, Point, Ray};
@@ -68,7 +68,7 @@ impl Pinhole {
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
         let (plane, plane_by_pixel) = self.sensor.plane(pixel)?;
         let (direction, by_plane) = direction_of_plane(plane);
-        Ok((central_ray(direction), by_plane * plane_by_pixel))
+        Ok((central_ray(direction), product(&by_plane, &plane_by_pixel)))
     }
 
     #[inline]
@@ -78,6 +78,6 @@ impl Pinhole {
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
         let (plane, by_point) = plane_of_point(point.xyz)?;
         let (pixel, by_plane) = self.sensor.pixel(plane)?;
-        Ok((pixel, by_plane * by_point))
+        Ok((pixel, product(&by_plane, &by_point)))
     }
 }

@@ -13,6 +13,8 @@ use super::polynomial::{derivative, difference, evaluate, first_positive_root, p
 pub(super) struct Radial {
     numerator: [f64; 5],
     denominator: [f64; 4],
+    /// Whether the denominator is one everywhere.
+    polynomial: bool,
     /// Radius up to which the map is one to one; infinite where it always is.
     limit: f64,
     /// The distorted radius at the limit.
@@ -46,6 +48,7 @@ impl Radial {
             Self {
                 numerator,
                 denominator,
+                polynomial: denominator == [1.0, 0.0, 0.0, 0.0],
                 limit: f64::INFINITY,
                 distorted_limit: f64::INFINITY,
             }
@@ -77,6 +80,9 @@ impl Radial {
     #[inline]
     pub(super) fn factor(&self, s: f64) -> (f64, f64) {
         let (n, n_slope) = evaluate(&self.numerator, s);
+        if self.polynomial {
+            return (n, n_slope);
+        }
         let (d, d_slope) = evaluate(&self.denominator, s);
         let factor = n / d;
         (factor, (n_slope - factor * d_slope) / d)
@@ -97,8 +103,13 @@ impl Radial {
             return Err(LensError::OutsideField);
         }
         let (factor, slope) = self.factor(s);
-        let jacobian =
-            Matrix2::from_diagonal_element(factor) + place * place.transpose() * (2.0 * slope);
+        let bend = place * (2.0 * slope);
+        let jacobian = Matrix2::new(
+            factor + place.x * bend.x,
+            place.x * bend.y,
+            place.y * bend.x,
+            factor + place.y * bend.y,
+        );
         Ok((place * factor, jacobian))
     }
 
@@ -112,7 +123,7 @@ impl Radial {
         distorted: Vector2<f64>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
         let distorted_radius = distorted.norm();
-        let radius = self.radius(distorted_radius)?;
+        let radius = self.radius(distorted_radius, 4.0 * f64::EPSILON)?;
         let (factor, slope) = self.factor(radius * radius);
         let growth = factor + 2.0 * radius * radius * slope;
         if growth <= 0.0 {
@@ -127,13 +138,13 @@ impl Radial {
         Ok((unit * radius, jacobian))
     }
 
-    /// The radius that is distorted to `distorted`.
+    /// The radius that is distorted to `distorted`, but for a share `tolerance` of that.
     ///
     /// # Errors
     /// [`LensError::OutsideField`] beyond the largest distorted radius, [`LensError::NoConvergence`]
     /// where Newton's method does not end, which its bracket rules out for finite input.
     #[inline]
-    pub(super) fn radius(&self, distorted: f64) -> Result<f64, LensError> {
+    pub(super) fn radius(&self, distorted: f64, tolerance: f64) -> Result<f64, LensError> {
         if distorted == 0.0 {
             return Ok(0.0);
         }
@@ -149,7 +160,7 @@ impl Radial {
         let high = self
             .radius_beyond(distorted)
             .ok_or(LensError::OutsideField)?;
-        increasing_root(excess, high, distorted, 4.0 * f64::EPSILON * distorted)
+        increasing_root(excess, high, distorted, tolerance * distorted)
             .ok_or(LensError::NoConvergence)
     }
 
@@ -195,10 +206,56 @@ pub(super) fn increasing_root(
         let trusted = newton > low && newton < high && (newton - x).abs() < 0.75 * last_step;
         let next = if trusted { newton } else { 0.5 * (low + high) };
         last_step = (next - x).abs();
-        if last_step <= f64::EPSILON * next {
+        // The error of a Newton step is of the order of its square.
+        if last_step <= if trusted { 1e-10 } else { f64::EPSILON } * next {
             return Some(next);
         }
         x = next;
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_is_where_growth_or_the_denominator_ends() {
+        // r (1 - 0.3 r^2) turns at r^2 = 1 / 0.9.
+        let turning = Radial::new([1.0, -0.3, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]).unwrap();
+        assert!((turning.limit() - (1.0 / 0.9f64).sqrt()).abs() < 1e-14);
+        // r / (1 - r^2 / 4) grows without bound towards r = 2.
+        let pole = Radial::new([1.0, 0.0, 0.0, 0.0, 0.0], [1.0, -0.25, 0.0, 0.0]).unwrap();
+        assert!((pole.limit() - 2.0).abs() < 1e-14);
+        assert!((pole.radius(1e9, 0.0).unwrap() - 2.0).abs() < 1e-8);
+        // r / (1 + r^2 / 4) turns at r = 2, where it is 1.
+        let fold = Radial::new([1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.25, 0.0, 0.0]).unwrap();
+        assert!((fold.limit() - 2.0).abs() < 1e-12);
+        assert!((fold.radius(0.8, 0.0).unwrap() - 1.0).abs() < 1e-14);
+        assert_eq!(fold.radius(1.01, 0.0), Err(LensError::OutsideField));
+        let free = Radial::new([1.0, 0.3, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]).unwrap();
+        assert_eq!(free.limit(), f64::INFINITY);
+        assert!(Radial::new([-1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]).is_none());
+        assert!(Radial::new([f64::NAN, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]).is_none());
+    }
+
+    /// Where the map saturates, Newton's method from the distorted radius overshoots at first.
+    #[test]
+    fn radii_come_back_up_to_the_limit() {
+        for (n, d) in [
+            ([1.0, -0.3, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]),
+            ([1.0, 12.0, 5.0, 0.2, 0.0], [1.0, 12.7, 9.3, 1.1]),
+            ([1.0, 0.9, -0.05, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]),
+        ] {
+            let radial = Radial::new(n, d).unwrap();
+            let reach = radial.limit().min(50.0);
+            for i in 1..1000 {
+                let radius = reach * f64::from(i) / 1000.0;
+                let distorted = radius * radial.factor(radius * radius).0;
+                let off = (radial.radius(distorted, 4.0 * f64::EPSILON).unwrap() - radius).abs();
+                // Towards the limit the slope goes to zero, and rounding grows by its inverse.
+                assert!(off < 1e-10 * radius, "{radius} {off:e}");
+            }
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
 use super::LensError;
+use super::perspective::product;
 use crate::frame::Pixel;
 
 /// A homography from the distorted image plane at unit depth to pixels: a camera matrix, one behind
@@ -50,16 +51,22 @@ impl Sensor {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn transfer(matrix: &Matrix3<f64>, place: Vector2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-    let seen = matrix * place.push(1.0);
+    let seen = product(matrix, &place.push(1.0));
     let inverse = 1.0 / seen.z;
     let image = seen.xy() * inverse;
     // A place whose square overflows has no direction in these numbers.
     let ahead = seen.z > 0.0 && image.norm_squared().is_finite();
     ahead.then(|| {
-        let rows = matrix.fixed_view::<2, 2>(0, 0);
-        let depth = matrix.fixed_view::<1, 2>(2, 0);
-        (image, (rows - image * depth) * inverse)
+        let [x, y] = [image.x, image.y];
+        let m = matrix;
+        let slope = Matrix2::new(
+            (m.m11 - x * m.m31) * inverse,
+            (m.m12 - x * m.m32) * inverse,
+            (m.m21 - y * m.m31) * inverse,
+            (m.m22 - y * m.m32) * inverse,
+        );
+        (image, slope)
     })
 }

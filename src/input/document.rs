@@ -213,7 +213,7 @@ impl Node {
             Kind::Text(t) => format!("{t:?}"),
             Kind::Number(x) => x.to_string(),
             Kind::Boolean(b) => b.to_string(),
-            Kind::List(_) => "a list".to_owned(),
+            Kind::List(list) => format!("a list of {}", list.len()),
             Kind::Table(_) => "a table".to_owned(),
             Kind::Other(date) => date.clone(),
         }
