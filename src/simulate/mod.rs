@@ -18,6 +18,7 @@ mod rocks;
 mod scene;
 mod scene_cameras;
 mod scene_file;
+mod scene_platforms;
 mod terrain_file;
 mod traverse;
 
