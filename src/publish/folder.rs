@@ -101,7 +101,7 @@ impl Folder {
         }
         self.is_done = true;
         remove(&old)?;
-        Ok(self.target.clone())
+        Ok(short(&self.target))
     }
 }
 
@@ -111,6 +111,21 @@ impl Drop for Folder {
             // Nothing more can be done about a folder that cannot be removed.
             let _ = fs::remove_dir_all(&self.making);
         }
+    }
+}
+
+/// A folder as one would type it: without detours, and from here where it lies below.
+fn short(folder: &Path) -> PathBuf {
+    let Ok(plain) = folder.canonicalize() else {
+        return folder.to_owned();
+    };
+    let here = std::env::current_dir().and_then(|here| here.canonicalize());
+    match here
+        .ok()
+        .and_then(|here| Some(plain.strip_prefix(here).ok()?.to_owned()))
+    {
+        Some(below) if below != Path::new("") => below,
+        _ => plain,
     }
 }
 
