@@ -1,5 +1,7 @@
 //! Every kind of bad input, and the exact words it gets.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,6 +1,8 @@
 //! Whole runs: the same bytes at any number of threads, the same map from any origin, every row
 //! accounted for, and the real data sets where they are at hand.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write as _;

@@ -4,8 +4,6 @@ mod check;
 mod console;
 mod evaluate;
 mod options;
-mod project;
-mod run;
 mod simulate;
 
 use std::process::ExitCode;
@@ -13,6 +11,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::error::Error;
+use crate::pipeline;
 
 /// Maps of rocks from posed pictures: projects every detection onto the terrain, fuses all views
 /// into one map, and draws the fused rocks back into every picture.
@@ -34,9 +33,9 @@ Exit codes: 0 done, 1 done but more records were faulty than the run allows, 2 n
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Read, project, fuse and publish: the whole job
-    Run(run::Args),
+    Run(options::JobArgs),
     /// The same up to the ground: every detection by itself, with footprints and rejects
-    Project(project::Args),
+    Project(options::JobArgs),
     /// Validate a pipeline and all its inputs, compute nothing, list all faults at once
     Check(check::Args),
     /// Make a data set with known truth from a scene file
@@ -50,8 +49,8 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.command {
-        Command::Run(args) => run::run(&args),
-        Command::Project(args) => project::project(&args),
+        Command::Run(args) => args.carry_out(pipeline::run),
+        Command::Project(args) => args.carry_out(pipeline::project),
         Command::Check(args) => check::check(&args),
         Command::Simulate(args) => simulate::simulate(&args),
         Command::Evaluate(args) => evaluate::evaluate(&args),

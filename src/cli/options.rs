@@ -1,11 +1,13 @@
 //! Options that several subcommands share.
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Args;
 
+use super::console::{self, Console};
 use crate::error::{Error, Fault, Place};
-use crate::pipeline::{Config, Overrides};
+use crate::pipeline::{Config, Observer, Overrides, Summary};
 
 /// Which pipeline, over which data.
 #[derive(Debug, Args)]
@@ -27,18 +29,32 @@ pub(super) struct PipelineArgs {
     threads: Option<usize>,
 }
 
-/// Where outputs go.
+/// A pipeline to be carried out, and where its outputs go.
 #[derive(Debug, Args)]
-pub(super) struct OutputArgs {
+pub(super) struct JobArgs {
+    #[command(flatten)]
+    pipeline: PipelineArgs,
     /// Write outputs to this folder instead of the pipeline's own
     #[arg(long, value_name = "DIR")]
-    pub(super) out: Option<PathBuf>,
+    out: Option<PathBuf>,
     /// Replace the outputs of another run
     #[arg(long)]
-    pub(super) force: bool,
+    force: bool,
     /// Say nothing but errors and warnings
     #[arg(long, short)]
-    pub(super) quiet: bool,
+    quiet: bool,
+}
+
+/// A job of the pipeline.
+type Job = fn(&Config, bool, &dyn Observer) -> Result<Summary, Error>;
+
+impl JobArgs {
+    /// Carries the job out and closes with its table.
+    pub(super) fn carry_out(&self, job: Job) -> Result<ExitCode, Error> {
+        let config = self.pipeline.config(self.out.as_ref())?;
+        let summary = job(&config, self.force, &Console::new(self.quiet))?;
+        Ok(console::close(&summary, self.quiet))
+    }
 }
 
 impl PipelineArgs {

@@ -5,9 +5,18 @@
 
 use nalgebra::Vector2;
 
+use super::Coverage;
 use super::gate::Neighbours;
-use super::{Coverage, mixture::Weights};
 use crate::frame::Point;
+
+/// How the Gaussians of a view are weighted against each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weights {
+    /// All alike: standard EM.
+    Equal,
+    /// By the logistic of how much of the view each already accounts for: the paper's eq. 5.
+    Logistic,
+}
 
 /// The mixing weight of a view that says nothing about a cluster, beta(S = 1).
 pub(super) const NEUTRAL: f64 = 0.5;

@@ -6,20 +6,11 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use super::assignment::{Betas, Edges};
+use super::assignment::{Betas, Edges, Weights};
 use super::gate::Neighbours;
 use super::merge::collapsed;
 use super::{Coverage, Fusion, Member, Object, Observation, SolverEvidence, Stopped};
 use crate::frame::Point;
-
-/// How the Gaussians of a view are weighted against each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Weights {
-    /// All alike: standard EM.
-    Equal,
-    /// By the logistic of how much of the view each already accounts for: the paper's eq. 5.
-    Logistic,
-}
 
 /// Where the clusters start.
 #[derive(Debug, Clone, PartialEq)]

@@ -29,7 +29,8 @@ mod gate;
 mod merge;
 mod mixture;
 
-pub use mixture::{MixtureSettings, Start, Weights, fuse_mixture};
+pub use assignment::Weights;
+pub use mixture::{MixtureSettings, Start, fuse_mixture};
 
 use nalgebra::Matrix3;
 use serde::Serialize;

@@ -4,7 +4,8 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::config::Config;
-use super::read::{Inputs, hexadecimal};
+use super::digest::hexadecimal;
+use super::read::Inputs;
 use super::summary::{Stage, Summary};
 use crate::fuse::Fusion;
 

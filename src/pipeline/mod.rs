@@ -2,11 +2,14 @@
 //!
 //! The top functions read as the walk of a night's data: [`run`], [`project`] and [`check`].
 
+mod checks;
 mod config;
+mod digest;
 mod fuse;
 mod manifest;
 mod observer;
 mod paths;
+mod pictures;
 mod publish;
 mod read;
 mod stages;
@@ -16,9 +19,11 @@ pub use config::{
     Config, FusionConfig, InputConfig, Method, NoiseConfig, OutputConfig, Overrides, SiteConfig,
     TerrainConfig, ViewConfig,
 };
+pub use digest::InputFile;
 pub use observer::{Observer, Silent};
 pub use paths::{DEFAULT_DATA, Source};
-pub use read::{InputFile, Inputs, PictureDigest, read};
+pub use pictures::PictureDigest;
+pub use read::{Inputs, read};
 pub use stages::{Ground, Settings};
 pub use summary::{FileCount, Stage, Summary};
 

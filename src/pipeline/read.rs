@@ -4,20 +4,18 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-use serde::Serialize;
-use sha2::{Digest, Sha256};
-
 use super::Observer;
+use super::checks::cross_checks;
 use super::config::Config;
+use super::digest::{InputFile, digest};
 use super::paths::Source;
+use super::pictures::PictureDigest;
 use crate::camera::{Camera, read_cameras};
-use crate::detection::{Detection, DetectionFile, Mark, read_detections};
+use crate::detection::{Detection, DetectionFile, read_detections};
 use crate::error::{Error, Fault, Place};
 use crate::frame::{Geodetic, Site};
 use crate::input::{Reason, Reject};
 use crate::pose::{PoseFile, read_poses};
-use crate::publish::Picture;
 use crate::terrain::Terrain;
 use crate::view::{self, ImageFile, Sources, View, read_images};
 
@@ -43,34 +41,8 @@ pub struct Inputs {
     pub pictures: PictureDigest,
 }
 
-/// A file that was read.
-#[derive(Debug, Clone, Serialize)]
-pub struct InputFile {
-    /// What it was read as: `poses`, `images`, `cameras`, `detections`, `terrain`.
-    pub kind: &'static str,
-    /// As the run names it.
-    pub file: String,
-    /// Its size.
-    pub bytes: u64,
-    /// SHA-256 of its content, hexadecimal.
-    pub sha256: String,
-    /// Its records, where it is a table.
-    pub rows: Option<usize>,
-}
-
-/// The pictures of a run, taken together.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct PictureDigest {
-    /// How many are at hand.
-    pub count: usize,
-    /// Their size together.
-    pub bytes: u64,
-    /// SHA-256 over the SHA-256 of each, in the order of the views.
-    pub sha256: String,
-}
-
 /// A file with the path it was read from and the name it goes by.
-type Read<T> = (PathBuf, String, T);
+pub(super) type Read<T> = (PathBuf, String, T);
 
 /// Reads and checks all inputs of a run.
 ///
@@ -153,8 +125,8 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
 
 /// Faults of all inputs, so that they are told together.
 #[derive(Default)]
-struct Faults {
-    faults: Vec<Fault>,
+pub(super) struct Faults {
+    pub(super) faults: Vec<Fault>,
 }
 
 impl Faults {
@@ -231,65 +203,6 @@ fn terrain(config: &Config, site: Site, faults: &mut Faults) -> Option<Terrain> 
     }
 }
 
-/// What one file needs of another.
-fn cross_checks(
-    config: &Config,
-    poses: &[Read<PoseFile>],
-    detections: &[Read<DetectionFile>],
-    faults: &mut Faults,
-) {
-    let mut found = |file: &str, field: &str, found: &str, expected: &str| {
-        let place = Place::file(file);
-        faults
-            .faults
-            .push(Fault::found(place, field, found, expected));
-    };
-    let is_log = |file: &PoseFile| !file.is_per_image;
-    if let Some((_, shown, _)) = poses.iter().find(|(_, _, file)| is_log(file)) {
-        if config.input.images.is_empty() {
-            found(
-                shown,
-                "time",
-                "poses keyed by time",
-                "[input] images to say when pictures were taken",
-            );
-        }
-        if let Some((_, other, _)) = poses.iter().find(|(_, _, file)| !is_log(file)) {
-            found(
-                other,
-                "image_id",
-                "poses keyed by image",
-                "one key in all pose files",
-            );
-        }
-    }
-    let level = poses.iter().find(|(_, _, file)| !file.has_attitude);
-    let needs_heading = detections.iter().find(|(_, _, file)| !file.has_azimuth);
-    if let (Some((_, shown, _)), Some((_, other, _))) = (level, needs_heading) {
-        let expected = format!("an attitude, since {other} gives no azimuth_deg");
-        found(shown, "qw", "no attitude", &expected);
-    }
-    let spec = &config.terrain;
-    let in_pixels = |(_, _, file): &&Read<DetectionFile>| {
-        let needs =
-            |d: &Detection| d.range_m.is_none() && matches!(d.mark, Mark::Box(_) | Mark::Point(_));
-        file.detections.iter().any(needs)
-    };
-    if let Some((_, shown, _)) = detections.iter().find(in_pixels) {
-        if spec.path.is_empty() && spec.plane_m.is_none() {
-            found(
-                shown,
-                "",
-                "detections in pixels",
-                "a ground for them: [terrain] plane_m or path",
-            );
-        }
-        if config.input.cameras.is_empty() {
-            found(shown, "", "detections in pixels", "[input] cameras");
-        }
-    }
-}
-
 fn all_cameras(
     files: Vec<Read<crate::camera::Cameras>>,
     faults: &mut Faults,
@@ -305,27 +218,6 @@ fn all_cameras(
         }
     }
     all
-}
-
-fn digest(kind: &'static str, source: &Source, rows: Option<usize>) -> Result<InputFile, Error> {
-    let content = std::fs::read(&source.path).map_err(|e| Error::io(&source.path, "read", e))?;
-    Ok(InputFile {
-        kind,
-        file: source.shown.clone(),
-        bytes: content.len() as u64,
-        sha256: hexadecimal(&Sha256::digest(&content)),
-        rows,
-    })
-}
-
-/// Bytes as lower-case hexadecimal digits.
-pub(super) fn hexadecimal(bytes: &[u8]) -> String {
-    use std::fmt::Write as _;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a String cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 impl PoseFile {
@@ -380,70 +272,6 @@ impl Inputs {
         }
     }
 
-    /// Looks at the header of every picture. One that is missing or no picture costs a warning and
-    /// the view stays; one whose size is not its camera's belongs to another camera, and the view
-    /// goes.
-    fn check_pictures(&mut self, hash: bool, rejected_images: &mut HashMap<String, Reason>) {
-        let looked: Vec<_> = self
-            .views
-            .par_iter()
-            .map(|view| {
-                let picture = view.picture.as_ref()?;
-                let size = Picture::size_of(&picture.path, &picture.name);
-                let content = match (&size, hash) {
-                    (Ok(_), true) => std::fs::read(&picture.path).ok(),
-                    _ => None,
-                };
-                let digest = content.map(|c| (c.len() as u64, Sha256::digest(&c)));
-                Some((size.map_err(|e| e.to_string()), digest))
-            })
-            .collect();
-        let mut all = Sha256::new();
-        let mut kept = Vec::with_capacity(self.views.len());
-        for (mut view, looked) in std::mem::take(&mut self.views).into_iter().zip(looked) {
-            match looked {
-                None => {}
-                Some((Err(error), _)) => {
-                    self.warnings
-                        .push(format!("image {}: {error}", view.image_id));
-                    view.picture = None;
-                }
-                Some((Ok((width, height)), digest)) => {
-                    if let Some(camera) = &view.camera
-                        && (camera.width, camera.height) != (width, height)
-                    {
-                        let detail = format!(
-                            "found a picture of {width}x{height}, expected {}x{} as camera {} has",
-                            camera.width, camera.height, camera.name
-                        );
-                        self.rejects
-                            .push(self.image_reject(&view, Reason::PictureSize, detail));
-                        rejected_images.insert(view.image_id.clone(), Reason::PictureSize);
-                        continue;
-                    }
-                    if let Some((bytes, digest)) = digest {
-                        self.pictures.count += 1;
-                        self.pictures.bytes += bytes;
-                        all.update(digest);
-                    }
-                }
-            }
-            kept.push(view);
-        }
-        self.views = kept;
-        self.pictures.sha256 = hexadecimal(&all.finalize());
-    }
-
-    fn image_reject(&self, view: &View, reason: Reason, detail: String) -> Reject {
-        Reject {
-            file: view.listed.0.clone(),
-            line: Some(view.listed.1),
-            record: view.image_id.clone(),
-            reason,
-            detail,
-        }
-    }
-
     /// Gives every detection its view, sorted by view and then as the files have them.
     fn place_detections(
         &mut self,
@@ -488,53 +316,6 @@ impl Inputs {
             }
         }
         self.detections.sort_by_key(|&(view, _)| view);
-    }
-
-    /// What the views need that only shows once they stand.
-    fn check_views(&self, config: &Config) -> Result<(), Error> {
-        self.check_terrain(config)?;
-        let headless = |v: &&View| v.camera.is_none() && !v.pose.has_heading;
-        if config.view.fov_deg < 360.0
-            && let Some(view) = self.views.iter().find(headless)
-        {
-            let found = format!(
-                "{}, and image {} without a heading",
-                config.view.fov_deg, view.image_id
-            );
-            let fault = Fault::found(
-                Place::default(),
-                "view.fov_deg",
-                found,
-                "360 where the poses carry no attitude",
-            );
-            return Err(fault.into());
-        }
-        Ok(())
-    }
-}
-
-impl Inputs {
-    /// A terrain model that no view can see belongs to another site.
-    fn check_terrain(&self, config: &Config) -> Result<(), Error> {
-        let Some(terrain) = &self.terrain else {
-            return Ok(());
-        };
-        let away = |view: &View| terrain.distance_to(view.origin());
-        let Some(nearest_m) = self.views.iter().map(away).min_by(f64::total_cmp) else {
-            return Ok(());
-        };
-        if nearest_m <= config.reach().limit_m() {
-            return Ok(());
-        }
-        let shown: Vec<&str> = config
-            .terrain
-            .path
-            .iter()
-            .map(|s| s.shown.as_str())
-            .collect();
-        let place = Place::file(shown.join(", "));
-        let found = format!("a model {:.1} km from the nearest view", nearest_m / 1e3);
-        Err(Fault::found(place, "", found, "one that covers the site").into())
     }
 }
 
