@@ -18,6 +18,8 @@
 //! | [`publish`] | maps, tables, annotated pictures |
 //! | [`evaluate`] | a map against truth |
 //! | [`pipeline`] | a pipeline file to a map |
+//! | [`simulate`] | scenes with known truth: traverses, detections, pictures |
+//! | [`experiment`] | the paper's experiments, and a bench of methods over scenes |
 //! | [`cli`] | the command line |
 
 pub mod error;
@@ -42,5 +44,9 @@ pub mod publish;
 pub mod evaluate;
 
 pub mod pipeline;
+
+pub mod simulate;
+
+pub mod experiment;
 
 pub mod cli;

@@ -37,6 +37,7 @@ pub use fisheye::Fisheye;
 pub use lens::{BadLens, Lens, LensError};
 pub use mount::{Mount, PanTilt};
 pub use pinhole::{Intrinsics, Pinhole};
+pub(crate) use read::camera as read_camera;
 pub use read::{cameras_from_toml, read_cameras};
 pub use write::{cameras_to_toml, write_cameras};
 

@@ -58,7 +58,8 @@ pub fn cameras_from_toml(text: &str, shown: &str) -> Result<Cameras, Error> {
     Ok(named.collect())
 }
 
-fn camera(name: String, section: Section) -> Option<Camera> {
+/// The camera of one `[cameras.NAME]` table; `None` where it has faults, which the document keeps.
+pub(crate) fn camera(name: String, section: Section) -> Option<Camera> {
     if !section.is_present() {
         return None;
     }

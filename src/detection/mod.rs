@@ -1,8 +1,10 @@
 //! What a detector marked in the pictures.
 
 mod reader;
+mod writer;
 
 pub use reader::{DetectionFile, read_detections};
+pub use writer::{DetectionRecord, MeasurementRecord, write_detections};
 
 use crate::frame::Pixel;
 

@@ -51,6 +51,17 @@ impl Document {
         })
     }
 
+    /// Lays this document over another: tables are merged key by key, every other value of this
+    /// one replaces the other's. Each value keeps its own file and line.
+    #[must_use]
+    pub fn over(self, base: Document) -> Document {
+        Document {
+            file: self.file,
+            root: self.root.over(base.root),
+            faults: self.faults,
+        }
+    }
+
     /// Lays `KEY.PATH=VALUE` over the document, as `--set` gives it. A value that is not TOML is
     /// taken as text, so that `--set view.aim=bottom` needs no quotes.
     ///
@@ -175,6 +186,28 @@ fn value_node(text: &str, shown: &str, value: &Value) -> Node {
 }
 
 impl Node {
+    fn over(self, base: Node) -> Node {
+        let kind = match (self.kind, base.kind) {
+            (Kind::Table(mine), Kind::Table(mut merged)) => {
+                for (key, node) in mine {
+                    match merged.iter().position(|(k, _)| *k == key) {
+                        Some(i) => {
+                            let (_, below) = merged.remove(i);
+                            merged.insert(i, (key, node.over(below)));
+                        }
+                        None => merged.push((key, node)),
+                    }
+                }
+                Kind::Table(merged)
+            }
+            (mine, _) => mine,
+        };
+        Node {
+            place: self.place,
+            kind,
+        }
+    }
+
     fn shown(&self) -> String {
         match &self.kind {
             Kind::Text(t) => format!("{t:?}"),
@@ -345,6 +378,20 @@ impl<'a> Section<'a> {
         })
     }
 
+    /// A list of any number of finite numbers.
+    pub fn number_list(&self, key: &str) -> Option<Vec<f64>> {
+        self.take(key, "a list of finite numbers", |n| match &n.kind {
+            Kind::List(list) => list
+                .iter()
+                .map(|n| match n.kind {
+                    Kind::Number(x) if x.is_finite() => Some(x),
+                    _ => None,
+                })
+                .collect(),
+            _ => None,
+        })
+    }
+
     /// Three finite numbers.
     pub fn triple(&self, key: &str) -> Option<[f64; 3]> {
         self.numbers(key, &[3])?.try_into().ok()
@@ -458,6 +505,23 @@ mod tests {
         assert_eq!(
             again.set("x").unwrap_err().to_string(),
             "--set: found x, expected KEY.PATH=VALUE"
+        );
+    }
+
+    #[test]
+    fn a_document_over_another_merges_tables_and_keeps_places() {
+        let base = Document::parse("[a]\nx = 1\ny = 2\n[b]\nz = [1]\n", "base.toml").unwrap();
+        let mine = Document::parse("[a]\n\ny = \"no\"\n", "mine.toml").unwrap();
+        let merged = mine.over(base);
+        let root = merged.root();
+        assert_eq!(root.section("a").number("x", .., "a number"), Some(1.0));
+        assert_eq!(root.section("b").number_list("z"), Some(vec![1.0]));
+        root.section("a").number("y", .., "a number");
+        let faults = merged.into_faults();
+        let texts: Vec<String> = faults.iter().map(Fault::to_string).collect();
+        assert_eq!(
+            texts,
+            ["mine.toml:3:1: a.y: found \"no\", expected a number"]
         );
     }
 

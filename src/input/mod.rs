@@ -5,8 +5,10 @@
 
 mod document;
 mod reject;
+mod rows;
 mod table;
 
 pub use document::{Document, Section};
 pub use reject::{Reason, Reject};
+pub use rows::write_rows;
 pub use table::{Row, Table};

@@ -8,12 +8,14 @@ mod reader;
 mod record;
 mod time;
 mod track;
+mod writer;
 
 pub use reader::{PoseFile, read_poses};
 pub(crate) use reader::{pan_tilt, time};
 pub use record::{Attitude, PoseKey, PoseRow, Position};
 pub use time::Time;
 pub use track::{NoPose, Track};
+pub use writer::{ImageRecord, PoseRecord, format_time, write_images, write_poses};
 
 use nalgebra::{Matrix6, Vector6};
 use serde::Serialize;
@@ -76,6 +78,11 @@ impl PoseSigma {
             pitch: v[4],
             yaw: v[5],
         }
+    }
+
+    /// All six, multiplied by `factor`.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self::from_vector(self.to_vector() * factor)
     }
 
     /// The covariance of the pose's error, diagonal.
