@@ -11,6 +11,7 @@ mod layers;
 pub mod picture;
 mod rock;
 mod scene;
+pub(crate) mod svg;
 mod tables;
 
 pub use annotate::{Annotation, annotate};
