@@ -12,7 +12,7 @@ use super::field::Field;
 use super::ground::Ground;
 use super::random::{Purpose, normal, stream, uniform};
 use super::rocks::Rock;
-use super::scene::{Border, Detector, Scene, ScoreLaw};
+use super::scene::{Border, BoxExtent, Detector, Scene, ScoreLaw};
 use super::traverse::View;
 
 /// One box of the detector.
@@ -26,7 +26,7 @@ pub struct SimulatedDetection {
     pub edges_px: [f64; 4],
     /// Its confidence.
     pub score: f64,
-    /// One standard deviation of its centre by each axis, pixels: larger where it is an outlier.
+    /// One standard deviation of its aim point by each axis, pixels: larger where it is an outlier.
     pub sigma_px: f64,
 }
 
@@ -37,8 +37,10 @@ pub struct Appearance {
     pub centre: Pixel,
     /// Width of the box, pixels.
     pub width_px: f64,
-    /// Height of the box, pixels.
-    pub height_px: f64,
+    /// How far the body reaches above `centre`, pixels.
+    pub above_px: f64,
+    /// How far what stands out of the ground reaches below `centre`, pixels.
+    pub below_px: f64,
     /// Ground range from the camera, metres.
     pub range_m: f64,
 }
@@ -62,12 +64,16 @@ pub fn appearance(
     let across_camera = enu_from_camera.rotation.inverse().matrix() * across;
     let px_per_m = (jacobian * across_camera).norm();
     let azimuth = across.y.atan2(across.x);
-    let width_px = 2.0 * rock.shape.outline_support(azimuth) * rock.diameter_m * px_per_m;
+    // Pixels a diameter.
+    let px = rock.diameter_m * px_per_m;
+    let width_px = 2.0 * rock.shape.outline_support(azimuth) * px;
     let elevation = (-to_rock.z).atan2(ground_m);
+    let sight = to_rock.y.atan2(to_rock.x);
     Some(Appearance {
         centre,
         width_px,
-        height_px: rock.shape.aspect(elevation) * rock.diameter_m * px_per_m,
+        above_px: 0.5 * rock.shape.box_height(elevation, sight) * px,
+        below_px: elevation.sin().max(0.0) * rock.shape.outline_support(sight) * px,
         range_m: ground_m,
     })
 }
@@ -165,15 +171,31 @@ fn measured(
     SimulatedDetection {
         view,
         rock: Some(rock),
-        edges_px: edges(u, v, seen.width_px * size, seen.height_px * size),
+        edges_px: seen.edges_px(detector.extent, u, v, size),
         score: score(detector.score_true, rng),
         sigma_px,
     }
 }
 
-fn edges(u: f64, v: f64, width: f64, height: f64) -> [f64; 4] {
-    let (w, h) = (0.5 * width, 0.5 * height);
-    [u - w, v - h, u + w, v + h]
+impl Appearance {
+    /// The edges (left, upper, right, lower) of the rock's box when its point of the ground is
+    /// taken to be at (`u`, `v`) and its size `size` times the true one.
+    fn edges_px(&self, extent: BoxExtent, u: f64, v: f64, size: f64) -> [f64; 4] {
+        let (half, above) = (0.5 * self.width_px * size, self.above_px * size);
+        let below = match extent {
+            BoxExtent::Body => above,
+            BoxExtent::Visible => self.below_px * size,
+        };
+        [u - half, v - above, u + half, v + below]
+    }
+
+    /// Where in the rock's box its point of the ground lies, as a share of the height from the top.
+    pub fn aim(&self, extent: BoxExtent) -> f64 {
+        match extent {
+            BoxExtent::Body => 0.5,
+            BoxExtent::Visible => self.above_px / (self.above_px + self.below_px),
+        }
+    }
 }
 
 /// A logit-normal score.
@@ -220,11 +242,17 @@ impl Clutter<'_> {
             return None;
         }
         let (sin, cos) = (-ray.direction.xyz().z).asin().sin_cos();
-        let aspect = 2.0 * (0.5 * sin).hypot(self.scene.rocks.height_ratio * cos);
+        let seen = Appearance {
+            centre: Pixel::new(u, v),
+            width_px: width,
+            above_px: width * (0.5 * sin).hypot(self.scene.rocks.height_ratio * cos),
+            below_px: width * 0.5 * sin.max(0.0),
+            range_m: place.horizontal_distance(ray.origin),
+        };
         Some(SimulatedDetection {
             view: self.index,
             rock: None,
-            edges_px: edges(u, v, width, width * aspect),
+            edges_px: seen.edges_px(detector.extent, u, v, 1.0),
             score,
             sigma_px: detector.pixel_px,
         })

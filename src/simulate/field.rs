@@ -302,7 +302,8 @@ fn meet(rock: &Rock, ray: Ray<Enu>) -> Option<(f64, Vector3<f64>)> {
     if o.norm_squared() - along * along > reach * reach {
         return None;
     }
-    let (mut enter, mut leave, mut normal) = ellipsoid_span(shape.half_axes, shape.long_axis, o, d)?;
+    let (mut enter, mut leave, mut normal) =
+        ellipsoid_span(shape.half_axes, shape.long_axis, o, d)?;
     for &(n, distance) in &shape.facets {
         let toward = n.dot(&d);
         let gap = distance - n.dot(&o);

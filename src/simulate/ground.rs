@@ -60,14 +60,14 @@ impl Ground {
         self.base_m
             + self.slope[0] * east_m
             + self.slope[1] * north_m
-            + self.rough.at(east_m, north_m).0
+            + self.rough.height_m(east_m, north_m)
     }
 
     /// The height the model of the run gives there: with its error, or the surface of constant
     /// height where the run is given nothing better.
     pub fn model_height_m(&self, east_m: f64, north_m: f64) -> f64 {
         if self.model_follows {
-            self.height_m(east_m, north_m) + self.model_error.at(east_m, north_m).0
+            self.height_m(east_m, north_m) + self.model_error.height_m(east_m, north_m)
         } else {
             self.base_m
         }
@@ -88,18 +88,16 @@ impl Ground {
 
     /// The true ground's slope by east and north, metres a metre.
     pub fn slope_at(&self, east_m: f64, north_m: f64) -> [f64; 2] {
-        let rough = self.rough.at(east_m, north_m).1;
-        [
-            self.slope[0] + rough[0] - 2.0 * self.curvature[0] * east_m,
-            self.slope[1] + rough[1] - 2.0 * self.curvature[1] * north_m,
-        ]
+        self.up_and_slope(east_m, north_m).1
     }
 
     /// The distance along a ray at which it first meets the true ground, metres; `None` where it
     /// does not within `reach_m`, or starts below the ground.
     ///
-    /// Sphere tracing against the steepest slope the ground can have, so that nothing is stepped
-    /// over, from where the ray comes as low as the ground can be high; Newton's method at the end.
+    /// Sphere tracing, from where the ray comes as low as the ground can be high, against a slope
+    /// that the ground seldom exceeds. Where it does, a step may end below the ground, and bisection
+    /// finds the place; what might be missed is the tip of a crest that a grazing ray just touches.
+    /// Newton's method ends the search.
     pub(super) fn first_hit_m(&self, ray: Ray<Enu>, reach_m: f64) -> Option<f64> {
         let above = |t: f64| {
             let p = ray.at(t).xyz;
@@ -108,7 +106,7 @@ impl Ground {
         let d = ray.direction.xyz();
         let bend = 2.0 * self.curvature[0].abs().max(self.curvature[1].abs());
         let steepest = self.slope[0].hypot(self.slope[1])
-            + self.rough.slope_bound()
+            + SELDOM * self.rough.slope_bound()
             + bend * (reach_m + ray.origin.xyz.xy().norm());
         // How fast the gap may close along the ray.
         let closing = d.xy().norm() * steepest - d.z;
@@ -126,7 +124,7 @@ impl Ground {
                 return Some(bisect(above, previous, t));
             }
             if gap < NEAR_M
-                && let Some(hit) = self.newton(ray, t, gap)
+                && let Some(hit) = self.newton(ray, t)
             {
                 return (hit <= reach_m).then_some(hit);
             }
@@ -152,29 +150,53 @@ impl Ground {
     }
 
     /// The hit near a point of the ray closely above the ground; `None` where the ray runs along it.
-    fn newton(&self, ray: Ray<Enu>, start: f64, gap: f64) -> Option<f64> {
+    fn newton(&self, ray: Ray<Enu>, start: f64) -> Option<f64> {
         let d = ray.direction.xyz();
-        let (mut t, mut gap) = (start, gap);
-        for _ in 0..6 {
+        let mut t = start;
+        for _ in 0..8 {
             let p = ray.at(t).xyz;
-            let slope = self.slope_at(p.x, p.y);
+            let (up_m, slope) = self.up_and_slope(p.x, p.y);
+            let gap = p.z - up_m;
+            if gap.abs() < 1e-8 {
+                return Some(t);
+            }
             let rate = d.z - slope[0] * d.x - slope[1] * d.y;
             if rate > -0.01 {
                 return None;
             }
             t -= gap / rate;
-            let p = ray.at(t).xyz;
-            gap = p.z - self.up_m(p.x, p.y);
-            if gap.abs() < 1e-8 {
-                return Some(t);
+            if (t - start).abs() > FARTHEST_NEWTON_M {
+                return None;
             }
         }
         None
     }
+
+    fn up_and_slope(&self, east_m: f64, north_m: f64) -> (f64, [f64; 2]) {
+        let (rough_m, rough) = self.rough.at(east_m, north_m);
+        let [ke, kn] = self.curvature;
+        let up_m = self.base_m - self.origin_m
+            + self.slope[0] * east_m
+            + self.slope[1] * north_m
+            + rough_m
+            - ke * east_m * east_m
+            - kn * north_m * north_m;
+        let slope = [
+            self.slope[0] + rough[0] - 2.0 * ke * east_m,
+            self.slope[1] + rough[1] - 2.0 * kn * north_m,
+        ];
+        (up_m, slope)
+    }
 }
 
-/// How near the ground Newton's method takes over, metres: less than its finest undulations rise.
-const NEAR_M: f64 = 0.003;
+/// The share of the steepest slope undulations can have that they seldom exceed.
+const SELDOM: f64 = 0.35;
+
+/// How near the ground Newton's method takes over, metres.
+const NEAR_M: f64 = 0.008;
+
+/// How far along the ray it may go from there.
+const FARTHEST_NEWTON_M: f64 = 0.4;
 
 /// Where `above` changes sign between `low` (above) and `high` (at or below), to 1e-9 m.
 fn bisect(above: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {

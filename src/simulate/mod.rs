@@ -1,7 +1,7 @@
 //! Scenes with known truth: rocks on a ground, rovers that drive past them, a detector that misses,
 //! errs and invents, and pictures of it all.
 //!
-//! [`Scene::read`] reads a scene file, [`simulate`] plays it, [`write`] writes it as a data set in
+//! [`Scene::read`] reads a scene file, [`simulate`] plays it, [`write()`] writes it as a data set in
 //! the native formats. The same scene gives the same bytes, and a new use of randomness (pictures,
 //! say) changes none of the others: every purpose has a stream of its own.
 
@@ -18,6 +18,7 @@ mod rocks;
 mod scene;
 mod scene_cameras;
 mod scene_file;
+mod scene_platforms;
 mod terrain_file;
 mod traverse;
 
@@ -30,10 +31,14 @@ pub use output::{NO_OBJECT, write};
 pub use render::{Picture, render, write_picture};
 pub use rocks::{Rock, Shape};
 pub use scene::{
-    Area, Border, Clusters, Detector, GroundPlan, Occlusion, Palette, Path, PictureFormat,
-    Platform, PoseKey, PosePlan, RenderPlan, RockPlan, Scene, ScoreLaw, TerrainModel,
+    Area, Border, BoxExtent, Clusters, Detector, GroundPlan, Occlusion, Palette, Path,
+    PictureFormat, Platform, PoseKey, PosePlan, RenderPlan, RockPlan, Scene, ScoreLaw,
+    TerrainModel,
 };
 pub use traverse::View;
+
+#[cfg(test)]
+mod tests;
 
 /// A scene that has been played: the truth and what the sensors made of it.
 #[derive(Debug, Clone)]

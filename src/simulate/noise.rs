@@ -12,14 +12,30 @@ const MEAN_SQUARE: f64 = (181.0 / 231.0) * (181.0 / 231.0);
 pub(super) fn value_noise(key: u64, x: f64, y: f64) -> (f64, [f64; 2]) {
     let (i, sx, dx) = split(x);
     let (j, sy, dy) = split(y);
-    let columns = [mixed(i, 0x9e37_79b9_7f4a_7c15), mixed(i + 1, 0x9e37_79b9_7f4a_7c15)];
-    let rows = [mixed(j, 0xc2b2_ae3d_27d4_eb4f), mixed(j + 1, 0xc2b2_ae3d_27d4_eb4f)];
+    let columns = [mixed(i, COLUMN), mixed(i + 1, COLUMN)];
+    let rows = [mixed(j, ROW), mixed(j + 1, ROW)];
     let at = |column: usize, row: usize| corner(key ^ columns[column] ^ rows[row]);
     let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
     let (low, high) = (a + (b - a) * sx, c + (d - c) * sx);
     let slope_x = ((b - a) * (1.0 - sy) + (d - c) * sy) * dx;
     (low + (high - low) * sy, [slope_x, (high - low) * dy])
 }
+
+/// The value of [`value_noise`] alone.
+fn value(key: u64, x: f64, y: f64) -> f64 {
+    let (i, sx, _) = split(x);
+    let (j, sy, _) = split(y);
+    let columns = [mixed(i, COLUMN), mixed(i + 1, COLUMN)];
+    let rows = [mixed(j, ROW), mixed(j + 1, ROW)];
+    let at = |column: usize, row: usize| corner(key ^ columns[column] ^ rows[row]);
+    let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
+    let (low, high) = (a + (b - a) * sx, c + (d - c) * sx);
+    low + (high - low) * sy
+}
+
+/// Odd numbers that spread the bits of a lattice line.
+const COLUMN: u64 = 0x9e37_79b9_7f4a_7c15;
+const ROW: u64 = 0xc2b2_ae3d_27d4_eb4f;
 
 /// The lattice line below a coordinate, and the quintic of the rest with its slope.
 fn split(x: f64) -> (i64, f64, f64) {
@@ -90,6 +106,19 @@ impl SmoothSurface {
         (height, slope)
     }
 
+    /// The height of [`SmoothSurface::at`] alone, metres.
+    pub(super) fn height_m(&self, east_m: f64, north_m: f64) -> f64 {
+        if self.amplitude_m == 0.0 {
+            return 0.0;
+        }
+        let octaves = (0u64..).zip(OCTAVES);
+        octaves.fold(0.0, |height, (octave, (frequency, amplitude))| {
+            let f = frequency / self.length_m;
+            let h = value(self.key.wrapping_add(octave), east_m * f, north_m * f);
+            height + self.amplitude_m * amplitude * h
+        })
+    }
+
     /// No height is farther from zero than this, metres.
     pub(super) fn bound_m(&self) -> f64 {
         self.amplitude_m * OCTAVES.iter().map(|(_, a)| a).sum::<f64>()
@@ -115,6 +144,9 @@ mod tests {
             for j in 0..400 {
                 let (h, slope) = surface.at(f64::from(i) * 1.37, f64::from(j) * 1.31);
                 square += h * h / 160_000.0;
+                assert!(
+                    (h - surface.height_m(f64::from(i) * 1.37, f64::from(j) * 1.31)).abs() < 1e-15
+                );
                 assert!(h.abs() <= surface.bound_m());
                 assert!(slope[0].hypot(slope[1]) <= surface.slope_bound());
             }

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::Simulation;
-use super::scene::{PoseKey, Scene, TerrainModel};
+use super::scene::{BoxExtent, PoseKey, Scene, TerrainModel};
+use super::{Simulation, appearance};
 
 /// A pipeline that runs the data set it stands beside, told the scene's own noise, but neither its
 /// drift's length nor anything of its rocks.
@@ -31,7 +31,7 @@ pub(super) fn pipeline_toml(simulation: &Simulation) -> String {
         TerrainModel::Raster { .. } => writeln!(text, "path = \"terrain.tif\""),
     };
     let _ = writeln!(text, "height_sigma_m = {:?}", height_sigma_m(scene));
-    view(scene, &mut text);
+    view(simulation, &mut text);
     noise(scene, &mut text);
     let correction = if scene.poses.drift_share > 0.0 {
         "drift"
@@ -47,9 +47,14 @@ pub(super) fn pipeline_toml(simulation: &Simulation) -> String {
     text
 }
 
-fn view(scene: &Scene, text: &mut String) {
+fn view(simulation: &Simulation, text: &mut String) {
+    let scene = &simulation.scene;
     let detector = &scene.detector;
-    text.push_str("\n[view]\naim = \"center\"\n");
+    text.push_str("\n[view]\n");
+    let _ = match detector.extent {
+        BoxExtent::Body => writeln!(text, "aim = \"center\""),
+        BoxExtent::Visible => writeln!(text, "aim = {:?}", mean_aim(simulation)),
+    };
     if detector.min_range_m > 0.0 {
         let _ = writeln!(text, "min_range_m = {:?}", detector.min_range_m);
     }
@@ -58,6 +63,25 @@ fn view(scene: &Scene, text: &mut String) {
         let gaps = scene.platforms.iter().map(|p| p.station_s.max(p.pan_s));
         let _ = writeln!(text, "max_gap_s = {:?}", gaps.fold(1.0, f64::max));
     }
+}
+
+/// Where in their boxes the detected rocks' points of the ground lie on average.
+fn mean_aim(simulation: &Simulation) -> f64 {
+    let scene = &simulation.scene;
+    let aims: Vec<f64> = simulation
+        .detections
+        .iter()
+        .filter_map(|detection| {
+            let view = &simulation.views[detection.view];
+            let camera = &scene.cameras[view.camera];
+            let rock = &simulation.rocks[detection.rock?];
+            let seen = appearance(camera, &view.enu_from_camera(scene), rock)?;
+            Some(seen.aim(scene.detector.extent))
+        })
+        .collect();
+    let number = f64::from(u32::try_from(aims.len()).unwrap_or(u32::MAX));
+    let mean = aims.iter().sum::<f64>() / number.max(1.0);
+    (mean * 100.0).round() / 100.0
 }
 
 fn noise(scene: &Scene, text: &mut String) {

@@ -171,11 +171,15 @@ impl Shape {
             .fold(ellipse, |r, (distance, toward)| r.min(distance / toward))
     }
 
-    /// Height by width of the box when seen from an elevation above its horizon, radians: the
-    /// extents of the body with its buried half, taken as an ellipsoid.
-    pub fn aspect(&self, elevation: f64) -> f64 {
+    /// Height of the box in diameters, seen from an elevation above the rock's horizon along a
+    /// horizontal direction whose azimuth counts counter-clockwise from east, radians: no part of
+    /// the body, its buried half included, reaches beyond.
+    pub fn box_height(&self, elevation: f64, azimuth: f64) -> f64 {
         let (sin, cos) = elevation.sin_cos();
-        (sin * 0.5).hypot(cos * self.top) * 2.0
+        let depth = sin * self.outline_support(azimuth);
+        let round = depth.hypot(cos * self.half_axes.z);
+        // The top may be cut off the ellipsoid.
+        2.0 * round.min(depth + cos * self.top)
     }
 }
 

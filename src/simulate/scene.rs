@@ -250,6 +250,8 @@ pub struct Detector {
     pub occlusion: Occlusion,
     /// What becomes of boxes that reach beyond the picture.
     pub border: Border,
+    /// What a box is drawn around.
+    pub extent: BoxExtent,
 }
 
 /// A logit-normal law of scores.
@@ -268,6 +270,16 @@ pub struct Occlusion {
     pub rocks: bool,
     /// The ground does.
     pub ground: bool,
+}
+
+/// What a box is drawn around.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BoxExtent {
+    /// The whole body with its buried half: the rock's point of the ground is the box's centre.
+    Body,
+    /// What stands out of the ground, as detectors draw it: the rock's point of the ground lies
+    /// below the box's centre, the lower the flatter it is seen.
+    Visible,
 }
 
 /// What becomes of a box that reaches beyond the picture.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::camera::{
-    BadLens, BrownConrady, Camera, Fisheye, Intrinsics, Lens, Mount, Pinhole, read_camera,
+    BrownConrady, Camera, Equirectangular, Fisheye, Intrinsics, Lens, Mount, Pinhole, read_camera,
 };
 use crate::frame::{RigidTransform, Rotation, Vector};
 use crate::input::Section;
@@ -78,19 +78,25 @@ fn lens(section: &Section, intrinsics: Intrinsics) -> Lens {
     let distortion = section.number_list("distortion").unwrap_or_default();
     let made = match model.as_deref() {
         Some("brown_conrady") => BrownConrady::new(intrinsics, &distortion).map(Lens::BrownConrady),
-        Some("fisheye") => match <[f64; 4]>::try_from(distortion) {
-            Ok(distortion) => Fisheye::new(intrinsics, distortion).map(Lens::Fisheye),
-            Err(other) => Err(BadLens::Count(other.len())),
-        },
+        Some("fisheye") => {
+            let four = <[f64; 4]>::try_from(distortion).unwrap_or_else(|other| {
+                let found = format!("{} coefficients", other.len());
+                section.fault("distortion", found, "4 for a fisheye");
+                [0.0; 4]
+            });
+            Fisheye::new(intrinsics, four).map(Lens::Fisheye)
+        }
         _ => {
             if !distortion.is_empty() {
-                section.fault("distortion", "a list", "none for a pinhole");
+                let found = format!("{} coefficients", distortion.len());
+                section.fault("distortion", found, "none for a pinhole");
             }
             Pinhole::new(intrinsics).map(Lens::Pinhole)
         }
     };
     made.unwrap_or_else(|bad| {
         section.problem("distortion", bad.to_string());
-        Lens::Equirectangular(crate::camera::Equirectangular::new(16, 16))
+        // Any lens serves: the scene is refused.
+        Lens::Equirectangular(Equirectangular::new(16, 16))
     })
 }

@@ -63,7 +63,9 @@ fn height_grid(simulation: &Simulation, post_m: f64) -> Result<HeightGrid, Error
         let (c, r) = (column as f64, row as f64);
         let lon_deg = crs_from_post.x0 + crs_from_post.x_column * c;
         let lat_deg = crs_from_post.y0 + crs_from_post.y_row * r;
-        let p = site.enu(Geodetic::from_degrees(lat_deg, lon_deg, height_m)).xyz;
+        let p = site
+            .enu(Geodetic::from_degrees(lat_deg, lon_deg, height_m))
+            .xyz;
         simulation.ground.model_height_m(p.x, p.y)
     };
     let heights: Vec<f64> = (0..rows)

@@ -14,6 +14,10 @@ const PIECE_M: f64 = 2.0;
 /// The most pieces a cell in doubt is cut into.
 const MAX_PIECES: u32 = 64;
 
+/// The most a cell in doubt is widened to either side, as a share of its leg: where a ray is all but
+/// vertical, its way across the raster says nothing of its length.
+const MAX_ROOM: f64 = 0.01;
+
 /// Where a Newton step is so short that the next one would be of the order of rounding, metres.
 const LAST_STEP_M: f64 = 1e-5;
 
@@ -48,21 +52,23 @@ impl March<'_> {
         };
         let above = leg.height.from(s0) - patch.along(line.at(s0), line.step);
         let (length, slack) = (s1 - s0, line.slack_m);
+        // The bend moves the borders of the cell by so much.
+        let room = (line.bend / line.step[0].hypot(line.step[1])).min(MAX_ROOM);
         let crossing = Crossing::new(number, patch, leg, &line, 0.5 * (s0 + s1));
         let entered = self.passed != Passed::All && self.passed != Passed::Tile(number);
         if entered && above.c <= slack {
             self.enter(&crossing, leg.t(s0))?;
         }
         self.passed = Passed::Tile(number);
-        if above.at(above.lowest(length)) > slack {
+        let wide = above.from(-room);
+        if wide.at(wide.lowest(length + 2.0 * room)) > slack {
             return Continue(());
         }
-        let ends = (leg.t(s0), leg.t(s1));
         let hit = if above.c > slack && above.at(length) < -slack {
             let s = above.first_not_positive(length).unwrap_or(length);
-            self.polish(&crossing, leg.t(s0 + s), ends)
+            self.polish(&crossing, leg.t(s0 + s), (leg.t(s0), leg.t(s1)))
         } else {
-            self.refine(&crossing, leg, ends)
+            self.refine(&crossing, leg, (leg.t(s0 - room), leg.t(s1 + room)))
         };
         hit.map_or(Continue(()), |t| Break(Ok(t)))
     }
@@ -130,7 +136,8 @@ impl March<'_> {
             }
             t += step;
             if step.abs() < LAST_STEP_M {
-                return Some(t);
+                let landed = crossing.is_amid(&surface) || self.is_known(crossing, t);
+                return landed.then_some(t);
             }
         }
         self.bisect(crossing, ends)
@@ -154,14 +161,19 @@ impl March<'_> {
                 above = middle;
             }
         }
-        Some(below)
+        self.is_known(crossing, below).then_some(below)
+    }
+
+    /// Whether the raster knows the ground at `t`: a hit just off its edge is none.
+    fn is_known(&self, crossing: &Crossing, t: f64) -> bool {
+        let tile = &self.model.tiles[crossing.number];
+        let position = tile.position(self.site.geodetic(self.ray.at(t)));
+        position.is_some_and(|position| tile.patch_at(position).is_some())
     }
 
     /// A cell in doubt, in pieces that do not bend.
     fn refine(&self, crossing: &Crossing, leg: &Leg, ends: (f64, f64)) -> Option<f64> {
-        // The bend moves the borders of the cell by less than this share of it.
-        let room = 0.01 * (ends.1 - ends.0) + 1e-6;
-        let (first, last) = ((ends.0 - room).max(leg.t0), (ends.1 + room).min(leg.t1));
+        let (first, last) = ((ends.0 - 1e-6).max(leg.t0), (ends.1 + 1e-6).min(leg.t1));
         let pieces = pieces(last - first);
         let tile = &self.model.tiles[crossing.number];
         let mut t0 = first;
@@ -175,6 +187,7 @@ impl March<'_> {
             let line = Line {
                 start: from,
                 step: [to[0] - from[0], to[1] - from[1]],
+                bend: 0.0,
                 slack_m: 0.0,
             };
             let patch = tile.patch_at(line.at(0.5)).unwrap_or(crossing.patch);
@@ -201,6 +214,19 @@ impl Crossing {
             rate: line.step.map(|step| step / length),
             climb: leg.height.slope(s) / length,
         }
+    }
+
+    /// Whether a surface is so far from the borders of its cell that one more step stays in it.
+    fn is_amid(&self, surface: &Surface) -> bool {
+        let Surface::Tile(_, patch, position) = surface else {
+            return true;
+        };
+        let amid = |offset: f64, rate: f64| {
+            let room = LAST_STEP_M * rate.abs();
+            offset > room && offset < 1.0 - room
+        };
+        amid(position[0] - patch.column, self.rate[0])
+            && amid(position[1] - patch.row, self.rate[1])
     }
 
     /// How the height of the ray above a surface grows, metres a metre.

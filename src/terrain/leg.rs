@@ -48,12 +48,14 @@ impl Leg {
     }
 }
 
-/// A leg in a raster: column and row are `start + step s`, but for a bend that is worth less than
-/// `slack_m` in the height of the ray above the surface.
+/// A leg in a raster: column and row are `start + step s`, but for a bend.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
     pub start: [f64; 2],
     pub step: [f64; 2],
+    /// What the bend is worth at most, cells.
+    pub bend: f64,
+    /// What it is worth at most in the height of the ray above the surface, metres.
     pub slack_m: f64,
 }
 
@@ -186,6 +188,7 @@ mod tests {
         let line = Line {
             start: [0.5, 4.75],
             step: [6.0, -4.0],
+            bend: 0.0,
             slack_m: 0.0,
         };
         let mut blocks = Blocks::new([7.0, 5.0], line, 0.0, 1.0);
@@ -207,6 +210,7 @@ mod tests {
         let line = Line {
             start: [-2.0, 1.0],
             step: [8.0, 0.0],
+            bend: 0.0,
             slack_m: 0.0,
         };
         assert_eq!(line.clip([4.0, 3.0], 0.0, 1.0), Some((0.25, 0.75)));

@@ -200,6 +200,7 @@ impl March<'_> {
         (step[0].hypot(step[1]) < tile.half_turn).then_some(Line {
             start,
             step,
+            bend,
             slack_m: SLACK_M + 4.0 * tile.step_m * bend,
         })
     }

@@ -73,7 +73,7 @@ fn sample(studio: &Studio, u: u32, v: u32, [du, dv]: [f64; 2]) -> Sample {
     Sample { light, surface }
 }
 
-/// A pixel's light: four more rays where its neighbours show something else.
+/// A pixel's light: two or four more rays where its neighbours show something else.
 fn smoothed(studio: &Studio, rows: &[Vec<Sample>], u: u32, v: u32) -> Colour {
     let (i, j) = (u as usize, v as usize);
     let here = rows[j][i];
@@ -83,19 +83,32 @@ fn smoothed(studio: &Studio, rows: &[Vec<Sample>], u: u32, v: u32) -> Colour {
         i.checked_sub(1).and_then(|i| rows[j].get(i)),
         j.checked_sub(1).and_then(|j| rows[j].get(i)),
     ];
-    if others.iter().flatten().all(|o| o.surface == here.surface) {
+    let mut edges = others
+        .iter()
+        .flatten()
+        .filter(|o| o.surface != here.surface);
+    let Some(first) = edges.next() else {
         return here.light;
-    }
-    // A rotated grid, symmetric about the pixel's centre.
-    const OFFSETS: [[f64; 2]; 4] = [
-        [0.125, 0.375],
-        [0.375, -0.125],
-        [-0.125, -0.375],
-        [-0.375, 0.125],
-    ];
-    let sum: Colour = OFFSETS.iter().map(|&o| sample(studio, u, v, o).light).sum();
-    sum / 4.0
+    };
+    // Outlines of rocks and of the horizon deserve more rays than pebbles do.
+    let is_outline =
+        |s: &Sample| !matches!(s.surface, Surface::Ground { .. } | Surface::Pebble { .. });
+    let offsets = if is_outline(&here) || is_outline(first) || edges.any(|o| is_outline(o)) {
+        &GRID[..]
+    } else {
+        &GRID[..2]
+    };
+    let sum: Colour = offsets.iter().map(|&o| sample(studio, u, v, o).light).sum();
+    sum / f64::from(u32::try_from(offsets.len()).unwrap_or(1))
 }
+
+/// A rotated grid, symmetric about the pixel's centre, and so are its first two places.
+const GRID: [[f64; 2]; 4] = [
+    [0.125, 0.375],
+    [-0.125, -0.375],
+    [0.375, -0.125],
+    [-0.375, 0.125],
+];
 
 /// Writes a picture in its format.
 ///

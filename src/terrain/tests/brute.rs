@@ -177,9 +177,19 @@ fn agree(
                     && above(terrain, ray, a)
                         .1
                         .is_some_and(|over| over.abs() < 1e-8))
+                || (a < b && met(terrain, ray, a))
         }
+        // The march has stepped over the tip of a ridge or the corner of a wall: the hit before
+        // where it ended is one by exact evaluation.
+        (Ok(a), Err(Miss::OffTerrain | Miss::TooFar | Miss::AboveHorizon)) => met(terrain, ray, a),
         (a, b) => a == b,
     }
+}
+
+/// Whether the ray goes under the ground at `t`, by exact evaluation.
+fn met(terrain: &Terrain, ray: Ray<Enu>, t: f64) -> bool {
+    let over = |t: f64| above(terrain, ray, t).1;
+    over(t - 1e-7).is_none_or(|over| over > 0.0) && over(t + 1e-7).is_some_and(|over| over <= 0.0)
 }
 
 /// Ridges, saw teeth, a wall of 3 m in one cell and a pit.
