@@ -104,7 +104,9 @@ impl Trial {
         let mut left = estimates.to_vec();
         let mut error = 0.0;
         for object in &self.objects {
-            let squared = left.iter().map(|estimate| (estimate - object).norm_squared());
+            let squared = left
+                .iter()
+                .map(|estimate| (estimate - object).norm_squared());
             let closest = squared.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
             error += closest.map_or(MISSING, |(at, squared)| {
                 left.swap_remove(at);
@@ -240,11 +242,7 @@ mod tests {
     #[test]
     fn means_agree_with_an_independent_program() {
         use super::super::statistics::{Mean, SignTest};
-        for (noise, em, paper) in [
-            (0.10, 0.066, 0.064),
-            (0.15, 0.67, 0.40),
-            (0.20, 1.54, 1.12),
-        ] {
+        for (noise, em, paper) in [(0.10, 0.066, 0.064), (0.15, 0.67, 0.40), (0.20, 1.54, 1.12)] {
             let methods = [CircleMethod::Em, CircleMethod::Paper];
             let errors = circle(noise, 4).errors(&methods, 50, SEED);
             for (errors, expected) in errors.iter().zip([em, paper]) {

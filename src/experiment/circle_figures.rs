@@ -60,8 +60,8 @@ impl Column {
     pub fn rows(&self) -> Vec<CircleRow> {
         let row = |method: CircleMethod| {
             let errors = self.of(method);
-            let tested =
-                !matches!(method, CircleMethod::SingleView | CircleMethod::Em) && !errors.is_empty();
+            let tested = !matches!(method, CircleMethod::SingleView | CircleMethod::Em)
+                && !errors.is_empty();
             Some(CircleRow {
                 method: method.name(),
                 noise: self.circle.noise,
@@ -114,7 +114,12 @@ fn scatter(plot: &Plot, trial: &Trial, method: CircleMethod, noise: f64) -> Stri
     let centres = method.find(trial, noise);
     let Frame { x, y, .. } = plot.frame;
     let heading = format!("{}: error {:.3}", method.title(), trial.error(&centres));
-    let mut drawn = text(x, y - 14.0, &heading, "font-size=\"14\" font-weight=\"600\"");
+    let mut drawn = text(
+        x,
+        y - 14.0,
+        &heading,
+        "font-size=\"14\" font-weight=\"600\"",
+    );
     drawn += &plot.axes([5.0, 5.0]);
     for (view, places) in trial.views.iter().enumerate() {
         let (shape, colour) = VIEWS[view % VIEWS.len()];
@@ -150,7 +155,11 @@ fn legend_5(n_views: usize, left: f64, y: f64) -> String {
         entry(&|at| mark(shape, at, 4.0, &look), &label, 72.0);
     }
     entry(&|at| cross(at, 4.0, TRUE_PLACE), "object", 76.0);
-    entry(&|at| mark(Shape::Circle, at, 8.0, CENTRE), "cluster centre", 110.0);
+    entry(
+        &|at| mark(Shape::Circle, at, 8.0, CENTRE),
+        "cluster centre",
+        110.0,
+    );
     drawn
 }
 
@@ -169,8 +178,16 @@ pub fn figure_6(columns: &[Column]) -> String {
             width: 540.0,
             height: 340.0,
         },
-        x: Axis::linear(low - margin, high + margin, "standard deviation of the detections (radii)"),
-        y: Axis::linear(0.0, 1.06 * top.fold(0.0, f64::max), "error (sum of squares)"),
+        x: Axis::linear(
+            low - margin,
+            high + margin,
+            "standard deviation of the detections (radii)",
+        ),
+        y: Axis::linear(
+            0.0,
+            1.06 * top.fold(0.0, f64::max),
+            "error (sum of squares)",
+        ),
     };
     let mut svg = Svg::new(640.0, 420.0);
     svg.push(&plot.axes([5.0, 6.0]));
@@ -236,7 +253,12 @@ fn legend_6(plot: &Plot) -> String {
             at(0.0),
             at(30.0),
             at(15.0),
-            mark(shape(method), (0.0, 0.0), 4.2, &format!("fill=\"{colour}\""))
+            mark(
+                shape(method),
+                (0.0, 0.0),
+                4.2,
+                &format!("fill=\"{colour}\"")
+            )
         );
         entry(sample, method.title());
     }
@@ -253,12 +275,16 @@ pub fn figure_7(columns: &[Column]) -> String {
     let methods: Vec<CircleMethod> = CircleMethod::fusing().collect();
     let of_columns = |m: &CircleMethod| columns.iter().flat_map(|c| c.of(*m)).copied().collect();
     let errors: Vec<f64> = methods.iter().flat_map::<Vec<f64>, _>(of_columns).collect();
-    let bottom = errors.iter().copied().fold(f64::INFINITY, f64::min).max(1e-9);
+    let bottom = errors
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min)
+        .max(1e-9);
     let top = errors.iter().copied().fold(bottom, f64::max);
     let plot = Plot {
         frame: Frame {
             x: 68.0,
-            y: 20.0,
+            y: 44.0,
             width: 540.0,
             height: 360.0,
         },
@@ -268,7 +294,7 @@ pub fn figure_7(columns: &[Column]) -> String {
             ..Axis::linear(0.8 * bottom, 1.3 * top, "error (sum of squares)")
         },
     };
-    let mut svg = Svg::new(640.0, 444.0);
+    let mut svg = Svg::new(640.0, 468.0);
     svg.push(&plot.y_axis(6.0));
     svg.push(&plot.frame.outline());
     let foot = plot.frame.y + plot.frame.height;
@@ -278,12 +304,22 @@ pub fn figure_7(columns: &[Column]) -> String {
         let views = column.circle.n_views.to_string();
         svg.push(&text(plot.at(x, top).0, foot + 18.0, &views, middle));
         let bound = column.circle.bound();
-        svg.push(&line(plot.at(x - 0.42, bound), plot.at(x + 0.42, bound), BOUND));
+        svg.push(&line(
+            plot.at(x - 0.42, bound),
+            plot.at(x + 0.42, bound),
+            BOUND,
+        ));
         for (m, &method) in methods.iter().enumerate() {
             let slot = 0.8 / count(methods.len());
             let centre = x - 0.4 + slot * (count(m) + 0.5);
             if let Some(statistics) = BoxStatistics::of(column.of(method)) {
-                svg.push(&notched_box(&plot, centre, 0.36 * slot, &statistics, method));
+                svg.push(&notched_box(
+                    &plot,
+                    centre,
+                    0.36 * slot,
+                    &statistics,
+                    method,
+                ));
             }
         }
     }
@@ -293,13 +329,7 @@ pub fn figure_7(columns: &[Column]) -> String {
     svg.finish()
 }
 
-fn notched_box(
-    plot: &Plot,
-    x: f64,
-    half: f64,
-    s: &BoxStatistics,
-    method: CircleMethod,
-) -> String {
+fn notched_box(plot: &Plot, x: f64, half: f64, s: &BoxStatistics, method: CircleMethod) -> String {
     let colour = colour(method);
     let stroke = format!("stroke=\"{colour}\" stroke-width=\"1.4\"");
     let waist = 0.5 * half;
@@ -321,10 +351,15 @@ fn notched_box(
         s.lower_quartile,
         s.upper_quartile
     ));
-    let look = format!("fill=\"{colour}\" fill-opacity=\"0.18\" stroke-linejoin=\"round\" {stroke}");
+    let look =
+        format!("fill=\"{colour}\" fill-opacity=\"0.18\" stroke-linejoin=\"round\" {stroke}");
     let mut drawn = format!("<g>{note}{}", polygon(corners, &look));
     let heavy = format!("stroke=\"{colour}\" stroke-width=\"2.4\"");
-    drawn += &line(plot.at(x - waist, s.median), plot.at(x + waist, s.median), &heavy);
+    drawn += &line(
+        plot.at(x - waist, s.median),
+        plot.at(x + waist, s.median),
+        &heavy,
+    );
     let ends = [
         (s.lower_quartile, s.whiskers[0]),
         (s.upper_quartile, s.whiskers[1]),
@@ -340,9 +375,10 @@ fn notched_box(
     drawn + "</g>\n"
 }
 
+/// One row above the diagram.
 fn legend_7(plot: &Plot, methods: &[CircleMethod]) -> String {
-    let x = plot.frame.x + plot.frame.width - 190.0;
-    let mut y = plot.frame.y + 24.0;
+    let y = plot.frame.y - 14.0;
+    let mut x = plot.frame.x;
     let mut drawn = String::new();
     for &method in methods {
         let colour = colour(method);
@@ -351,10 +387,9 @@ fn legend_7(plot: &Plot, methods: &[CircleMethod]) -> String {
              fill-opacity=\"0.18\" stroke=\"{colour}\" stroke-width=\"1.4\"/>\n",
             y - 10.5
         );
-        drawn += &text(x + 32.0, y, method.title(), "font-size=\"13\"");
-        y += 21.0;
+        drawn += &text(x + 30.0, y, method.title(), "font-size=\"13\"");
+        x += 170.0;
     }
     drawn += &line((x, y - 4.5), (x + 22.0, y - 4.5), BOUND);
-    drawn += &text(x + 32.0, y, "bound of the mean", "font-size=\"13\"");
-    drawn
+    drawn + &text(x + 30.0, y, "bound of the mean", "font-size=\"13\"")
 }

@@ -71,7 +71,9 @@ fn plot(views: &[View], ground: &Ground) -> Plot {
         high = [high[0].max(x), high[1].max(y)];
     }
     let margin_m = 0.5;
-    let (low, high) = (low.map(|x| x - margin_m), high.map(|x| x + margin_m));
+    // Below the cameras stand their names.
+    let low = [low[0] - margin_m, low[1] - 2.0 * margin_m];
+    let high = high.map(|x| x + margin_m);
     let size = [high[0] - low[0], high[1] - low[1]];
     let scale = SIDE / size[0].max(size[1]);
     Plot {
@@ -98,7 +100,7 @@ fn camera(plot: &Plot, index: usize, view: &View) -> String {
     let label = format!("position {}", index + 1);
     let look = format!("font-size=\"12\" fill=\"{colour}\" font-weight=\"600\"");
     mark(Shape::Triangle, at, 6.0, &format!("fill=\"{colour}\""))
-        + &text(at.0 - 8.0, at.1 + 22.0, &label, &look)
+        + &text(at.0 - 8.0, at.1 + 20.0, &label, &look)
 }
 
 fn legend(n_views: usize, y: f64) -> String {

@@ -148,7 +148,12 @@ impl Plot {
         for (tick, label) in self.x.ticks(n_ticks[0]) {
             let (x, _) = self.at(tick, self.y.low);
             drawn += &line((x, self.frame.y), (x, bottom), GRID);
-            drawn += &text(x, bottom + 17.0, &label, "font-size=\"12\" text-anchor=\"middle\"");
+            drawn += &text(
+                x,
+                bottom + 17.0,
+                &label,
+                "font-size=\"12\" text-anchor=\"middle\"",
+            );
         }
         drawn += &text(
             self.frame.x + self.frame.width / 2.0,

@@ -20,6 +20,7 @@ pub use fuse::fuse;
 pub use observer::{Observer, Silent};
 pub use paths::{DEFAULT_DATA, Source};
 pub(crate) use publish::may_replace;
+pub(crate) use read::hexadecimal;
 pub use read::{InputFile, Inputs, PictureDigest, read};
 pub use stages::{Ground, Settings};
 pub use summary::{FileCount, Stage, Summary};

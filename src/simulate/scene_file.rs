@@ -9,7 +9,10 @@ use crate::input::{Document, Section};
 use crate::pose::PoseSigma;
 
 use super::diameters::DiameterLaw;
-use super::scene::{Area, Border, BoxExtent, Clusters, Detector, GroundPlan, Occlusion, Palette, PictureFormat, PoseKey, PosePlan, RenderPlan, RockPlan, Scene, ScoreLaw, TerrainModel};
+use super::scene::{
+    Area, Border, BoxExtent, Clusters, Detector, GroundPlan, Occlusion, Palette, PictureFormat,
+    PoseKey, PosePlan, RenderPlan, RockPlan, Scene, ScoreLaw, TerrainModel,
+};
 use super::scene_cameras::cameras;
 use super::scene_platforms::platforms;
 

@@ -388,7 +388,7 @@ fn the_pipeline_file_is_told_the_scene() {
     assert_eq!(
         text,
         "# Runs the simulated data set of this folder, with the noise of its scene.\n\
-         \n[site]\nname = \"default\"\n\
+         \n[site]\nname = \"heights-05\"\n\
          origin = { lat_deg = -24.45, lon_deg = -69.93, height_m = 1000.0 }\nbody = \"earth\"\n\
          \n[input]\nposes = \"poses.csv\"\ncameras = \"cameras.toml\"\n\
          detections = \"detections.csv\"\n\
