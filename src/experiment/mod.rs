@@ -36,7 +36,7 @@ const NOISES: [f64; 6] = [0.05, 0.10, 0.15, 0.20, 0.25, 0.30];
 /// Views of Figure 7.
 const VIEW_COUNTS: [usize; 5] = [1, 2, 3, 4, 5];
 /// Quality of the figures that are pictures.
-const JPEG_QUALITY: u8 = 80;
+const JPEG_QUALITY: u8 = 70;
 
 /// What is reproduced, and where.
 #[derive(Debug, Clone)]
