@@ -17,6 +17,7 @@
 //! | [`footprint`] | what a view could have seen |
 //! | [`publish`] | maps, tables, annotated pictures |
 //! | [`evaluate`] | a map against truth |
+//! | [`simulate`] | scenes with known truth: traverses, detectors, rendered pictures |
 //! | [`pipeline`] | a pipeline file to a map |
 //! | [`simulate`] | scenes with known truth: traverses, detections, pictures |
 //! | [`experiment`] | the paper's experiments, and a bench of methods over scenes |
@@ -42,6 +43,8 @@ pub mod footprint;
 pub mod publish;
 
 pub mod evaluate;
+
+pub mod simulate;
 
 pub mod pipeline;
 

@@ -2,9 +2,11 @@
 
 mod check;
 mod console;
+mod evaluate;
 mod options;
 mod project;
 mod run;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -37,6 +39,10 @@ enum Command {
     Project(project::Args),
     /// Validate a pipeline and all its inputs, compute nothing, list all faults at once
     Check(check::Args),
+    /// Make a data set with known truth from a scene file
+    Simulate(simulate::Args),
+    /// Hold a map against the truth: precision, recall, GOSPA, calibration
+    Evaluate(evaluate::Args),
 }
 
 /// Does what the command line says and tells how it went by the exit code: 0 done, 1 done with more
@@ -47,6 +53,8 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Project(args) => project::project(&args),
         Command::Check(args) => check::check(&args),
+        Command::Simulate(args) => simulate::simulate(&args),
+        Command::Evaluate(args) => evaluate::evaluate(&args),
     };
     match done {
         Ok(code) => code,

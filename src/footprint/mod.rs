@@ -86,3 +86,6 @@ impl Footprint {
         shape.is_some_and(|shape| shape.contains(east_m, north_m))
     }
 }
+
+#[cfg(test)]
+mod tests;

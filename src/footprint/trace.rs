@@ -13,6 +13,10 @@ use crate::project::level_direction;
 use crate::terrain::{Miss, Terrain};
 use crate::view::View;
 
+/// The trace is made out to this many times the greatest range and then clipped to it: where it runs
+/// to and fro along its rim, slivers between its chords stay outside.
+const BEYOND: f64 = 1.02;
+
 /// The footprint of a view.
 ///
 /// Without a terrain only views without a camera have one: their sector does not need it.
@@ -24,7 +28,7 @@ pub fn trace(view: &View, terrain: Option<&Terrain>, reach: Reach) -> Footprint 
                 camera,
                 enu_from_camera,
                 terrain,
-                limit_m: reach.limit_m(),
+                limit_m: reach.limit_m() * BEYOND,
             };
             eye.footprint()
         }

@@ -492,6 +492,7 @@ impl Inputs {
 
     /// What the views need that only shows once they stand.
     fn check_views(&self, config: &Config) -> Result<(), Error> {
+        self.check_terrain(config)?;
         let headless = |v: &&View| v.camera.is_none() && !v.pose.has_heading;
         if config.view.fov_deg < 360.0
             && let Some(view) = self.views.iter().find(headless)
@@ -509,6 +510,31 @@ impl Inputs {
             return Err(fault.into());
         }
         Ok(())
+    }
+}
+
+impl Inputs {
+    /// A terrain model that no view can see belongs to another site.
+    fn check_terrain(&self, config: &Config) -> Result<(), Error> {
+        let Some(terrain) = &self.terrain else {
+            return Ok(());
+        };
+        let away = |view: &View| terrain.distance_to(view.origin());
+        let Some(nearest_m) = self.views.iter().map(away).min_by(f64::total_cmp) else {
+            return Ok(());
+        };
+        if nearest_m <= config.reach().limit_m() {
+            return Ok(());
+        }
+        let shown: Vec<&str> = config
+            .terrain
+            .path
+            .iter()
+            .map(|s| s.shown.as_str())
+            .collect();
+        let place = Place::file(shown.join(", "));
+        let found = format!("a model {:.1} km from the nearest view", nearest_m / 1e3);
+        Err(Fault::found(place, "", found, "one that covers the site").into())
     }
 }
 

@@ -122,10 +122,12 @@ pub(super) fn footprint(
 ) -> Ground {
     observer.begin("footprint", Some(inputs.views.len()));
     let reach = config.reach();
+    let sector = sector_reach(reach, inputs, &placed);
     let footprints: Vec<_> = inputs
         .views
         .par_iter()
         .map(|view| {
+            let reach = if view.camera.is_some() { reach } else { sector };
             let footprint = trace(view, inputs.terrain.as_ref(), reach);
             observer.step();
             footprint
@@ -148,6 +150,20 @@ pub(super) fn footprint(
         misses,
         footprints: Footprints::new(footprints),
         classes,
+    }
+}
+
+/// How far sectors reach where the run does not say: as far as any view without a camera has
+/// detected anything. A picture ends by itself, a sector does not.
+fn sector_reach(reach: Reach, inputs: &Inputs, placed: &[Placed]) -> Reach {
+    let blind = placed.iter().filter(|p| inputs.views[p.view].camera.is_none());
+    let farthest_m = blind.map(|p| p.hit.ground_range_m).max_by(f64::total_cmp);
+    match farthest_m {
+        Some(farthest_m) if reach.max_range_m.is_infinite() => Reach {
+            max_range_m: farthest_m,
+            ..reach
+        },
+        _ => reach,
     }
 }
 

@@ -42,7 +42,7 @@ impl Hit {
 ///
 /// A ray goes to its first hit with the terrain, or to its measured range, which needs no terrain.
 /// A bearing with a range goes to the place of the terrain at that slant range; without a terrain
-/// it is taken as level.
+/// it is taken to lie in the body's own x-y plane.
 ///
 /// # Errors
 /// A ray that misses the terrain, or a place outside the ranges the run trusts.
@@ -270,12 +270,16 @@ fn at_range_on_terrain(
     let arc = Arc::new(view, origin, bearing, is_azimuth, range_m);
     let too_short = Miss::RangeTooShort { range_m };
     let (elevation, normal) = match terrain {
-        Some(terrain) => arc.meet(terrain).ok_or(too_short)?,
-        None => (0.0, Vector3::z()),
+        Some(terrain) => {
+            let (elevation, normal) = arc.meet(terrain).ok_or(too_short)?;
+            (elevation, Some(normal))
+        }
+        None => (0.0, None),
     };
     let point = arc.at(elevation);
     let free = arc.by_elevation(elevation);
-    let keep = onto_surface(free, normal);
+    let keep = normal.map_or(Matrix3::identity(), |normal| onto_surface(free, normal));
+    let by_ground_height = normal.map_or(Vector3::zeros(), |n| free * (n.z / n.dot(&free)));
     let sideways = arc.right * (range_m * elevation.cos() * sigma);
     let along = (point - arc.origin).xyz * (range.sigma_m / range_m);
     let spread = sideways * sideways.transpose() + along * along.transpose();
@@ -290,7 +294,7 @@ fn at_range_on_terrain(
         ground_range_m: arc.origin.horizontal_distance(point),
         mark_covariance: keep * spread * keep.transpose(),
         by_pose: keep * by_pose,
-        by_ground_height: free * (normal.z / normal.dot(&free)),
+        by_ground_height,
     })
 }
 

@@ -172,3 +172,6 @@ pub fn place(
         hit,
     })
 }
+
+#[cfg(test)]
+mod tests;

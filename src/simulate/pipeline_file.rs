@@ -40,7 +40,7 @@ pub(super) fn pipeline_toml(simulation: &Simulation) -> String {
     };
     let _ = write!(
         text,
-        "\n[fusion]\nmethod = \"belief\"\npose_correction = \"{correction}\"\n\
+        "\n[fusion]\npose_correction = \"{correction}\"\n\
          \n[output]\ndir = \"map\"\nannotate = {}\n",
         scene.render.is_some(),
     );
