@@ -19,7 +19,6 @@
 //! | [`evaluate`] | a map against truth |
 //! | [`simulate`] | scenes with known truth: traverses, detectors, rendered pictures |
 //! | [`pipeline`] | a pipeline file to a map |
-//! | [`simulate`] | scenes with known truth: traverses, detections, pictures |
 //! | [`experiment`] | the paper's experiments, and a bench of methods over scenes |
 //! | [`cli`] | the command line |
 
@@ -47,8 +46,6 @@ pub mod evaluate;
 pub mod simulate;
 
 pub mod pipeline;
-
-pub mod simulate;
 
 pub mod experiment;
 

@@ -26,7 +26,11 @@ const PASSING: [&str; 2] = ["run_id", "version"];
 #[test]
 fn every_fixture_gives_what_is_expected() {
     let cases = cases();
-    assert!(cases.len() >= 3, "found {} cases under fixtures/", cases.len());
+    assert!(
+        cases.len() >= 3,
+        "found {} cases under fixtures/",
+        cases.len()
+    );
     let faults: Vec<String> = cases.iter().flat_map(|case| run(case)).collect();
     assert!(faults.is_empty(), "\n{}\n", faults.join("\n"));
 }
@@ -34,8 +38,12 @@ fn every_fixture_gives_what_is_expected() {
 /// All folders under fixtures/ that hold a pipeline file.
 fn cases() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
-    let folders = fs::read_dir(root).unwrap().map(|entry| entry.unwrap().path());
-    let mut cases: Vec<PathBuf> = folders.filter(|f| f.join("pipeline.toml").exists()).collect();
+    let folders = fs::read_dir(root)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let mut cases: Vec<PathBuf> = folders
+        .filter(|f| f.join("pipeline.toml").exists())
+        .collect();
     cases.sort();
     cases
 }
@@ -96,8 +104,12 @@ fn files(folder: &Path) -> BTreeSet<PathBuf> {
 
 fn compare(out: &Path, expected: &Path) -> Vec<String> {
     let (made, wanted) = (files(out), files(expected));
-    let missing = wanted.difference(&made).map(|f| format!("{} is missing", f.display()));
-    let surplus = made.difference(&wanted).map(|f| format!("{} is not expected", f.display()));
+    let missing = wanted
+        .difference(&made)
+        .map(|f| format!("{} is missing", f.display()));
+    let surplus = made
+        .difference(&wanted)
+        .map(|f| format!("{} is not expected", f.display()));
     let mut faults: Vec<String> = missing.chain(surplus).collect();
     for file in made.intersection(&wanted) {
         let (a, b) = (out.join(file), expected.join(file));

@@ -98,7 +98,8 @@ fn camera(plot: &Plot, index: usize, view: &View) -> String {
     let origin = view.origin();
     let at = plot.at(origin.xyz.x, origin.xyz.y);
     let label = format!("view {}", index + 1);
-    let look = format!("font-size=\"12\" fill=\"{colour}\" font-weight=\"600\" text-anchor=\"middle\"");
+    let look =
+        format!("font-size=\"12\" fill=\"{colour}\" font-weight=\"600\" text-anchor=\"middle\"");
     mark(Shape::Triangle, at, 6.0, &format!("fill=\"{colour}\""))
         + &text(at.0, at.1 + 20.0, &label, &look)
 }

@@ -156,7 +156,9 @@ pub(super) fn footprint(
 /// How far sectors reach where the run does not say: as far as any view without a camera has
 /// detected anything. A picture ends by itself, a sector does not.
 fn sector_reach(reach: Reach, inputs: &Inputs, placed: &[Placed]) -> Reach {
-    let blind = placed.iter().filter(|p| inputs.views[p.view].camera.is_none());
+    let blind = placed
+        .iter()
+        .filter(|p| inputs.views[p.view].camera.is_none());
     let farthest_m = blind.map(|p| p.hit.ground_range_m).max_by(f64::total_cmp);
     match farthest_m {
         Some(farthest_m) if reach.max_range_m.is_infinite() => Reach {
