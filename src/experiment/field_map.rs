@@ -72,7 +72,7 @@ fn plot(views: &[View], ground: &Ground) -> Plot {
     }
     let margin_m = 0.5;
     // Below the cameras stand their names.
-    let low = [low[0] - margin_m, low[1] - 2.0 * margin_m];
+    let low = low.map(|x| x - 2.0 * margin_m);
     let high = high.map(|x| x + margin_m);
     let size = [high[0] - low[0], high[1] - low[1]];
     let scale = SIDE / size[0].max(size[1]);

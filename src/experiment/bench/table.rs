@@ -14,7 +14,7 @@ pub struct BenchRow {
     pub method: &'static str,
     /// Seeds.
     pub n_seeds: usize,
-    /// The means of [`COLUMNS`], in their order; none where no seed has the score.
+    /// The means, by column of the table; none where no seed has the score.
     pub means: Vec<Option<Mean>>,
 }
 
