@@ -202,14 +202,19 @@ impl Config {
         let paths = Paths::new(&input, path, overrides);
         let input = inputs(input, &paths);
         let terrain = terrain(root.section("terrain"), &paths);
+        let view = view(root.section("view"));
+        let noise = noise(root.section("noise"));
+        let fusion = fusion(root.section("fusion"));
+        let output = output(root.section("output"), path, overrides);
+        // Only now may a fault end it: all sections have told theirs.
         Some(Self {
             site: site?,
             input: input?,
             terrain,
-            view: view(root.section("view")),
-            noise: noise(root.section("noise")),
-            fusion: fusion(root.section("fusion"))?,
-            output: output(root.section("output"), path, overrides)?,
+            view,
+            noise,
+            fusion: fusion?,
+            output: output?,
         })
     }
 }

@@ -47,7 +47,7 @@ fn all_faults_of_a_scene_are_listed() {
          scene.toml:3:22: rocks.area.east_m: found 1, expected a number above west_m\n\
          scene.toml:4:1: rocks.height_ratio: found 2, expected 0.05 to 1\n\
          scene.toml:5:14: rocks.diameter.law: found \"golombek\", expected one of exponential, \
-         golombek_rapp\n\
+         golombek_rapp (is golombek_rapp meant?)\n\
          scene.toml:7:1: detector.px_50: unknown key, is px50 meant?\n\
          scene.toml:8:1: detector.p_max: found 1.5, expected 0 to 1\n\
          scene.toml:9:1: detector.min_range_m: found 20, expected a number below max_range_m\n\
@@ -274,8 +274,8 @@ fn the_same_scene_is_the_same_bytes_at_any_number_of_threads() {
         [
             "cameras.toml",
             "detections.csv",
-            "images/rover_0000.png",
-            "images/rover_0001.png",
+            "images/rover_0000.jpg",
+            "images/rover_0001.jpg",
             "labels.csv",
             "pipeline.toml",
             "poses.csv",
@@ -396,7 +396,7 @@ fn the_pipeline_file_is_told_the_scene() {
          \n[view]\naim = \"center\"\nmax_range_m = 14.0\n\
          \n[noise]\npixel_px = 1.5\npose = { east_m = 0.05, north_m = 0.05, up_m = 0.02, \
          roll_deg = 0.25, pitch_deg = 0.25, yaw_deg = 0.4 }\n\
-         \n[fusion]\nmethod = \"belief\"\npose_correction = \"per-view\"\n\
+         \n[fusion]\npose_correction = \"per-view\"\n\
          \n[output]\ndir = \"map\"\nannotate = false\n"
     );
 }
