@@ -19,6 +19,7 @@
 //! | [`evaluate`] | a map against truth |
 //! | [`simulate`] | scenes with known truth: traverses, detectors, rendered pictures |
 //! | [`pipeline`] | a pipeline file to a map |
+//! | [`experiment`] | the paper's experiments, and a bench of methods over scenes |
 //! | [`cli`] | the command line |
 
 pub mod error;
@@ -45,5 +46,7 @@ pub mod evaluate;
 pub mod simulate;
 
 pub mod pipeline;
+
+pub mod experiment;
 
 pub mod cli;

@@ -1,9 +1,11 @@
 //! The command line: what was typed, and how a run looks on a terminal. No logic of its own.
 
+mod bench_accuracy;
 mod check;
 mod console;
 mod evaluate;
 mod options;
+mod reproduce;
 mod simulate;
 
 use std::process::ExitCode;
@@ -42,6 +44,10 @@ enum Command {
     Simulate(simulate::Args),
     /// Hold a map against the truth: precision, recall, GOSPA, calibration
     Evaluate(evaluate::Args),
+    /// Make the figures of Thompson and Wettergreen (2005) anew, with this program's numbers
+    Reproduce(reproduce::Args),
+    /// Compare methods over many scenes and seeds
+    BenchAccuracy(bench_accuracy::Args),
 }
 
 /// Does what the command line says and tells how it went by the exit code: 0 done, 1 done with more
@@ -54,6 +60,8 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::check(&args),
         Command::Simulate(args) => simulate::simulate(&args),
         Command::Evaluate(args) => evaluate::evaluate(&args),
+        Command::Reproduce(args) => reproduce::reproduce(&args),
+        Command::BenchAccuracy(args) => bench_accuracy::bench_accuracy(&args),
     };
     match done {
         Ok(code) => code,

@@ -128,6 +128,19 @@ pub enum Method {
     Paper,
 }
 
+impl Method {
+    /// All methods there are.
+    pub const ALL: [Self; 2] = [Self::Em, Self::Paper];
+
+    /// Its name in pipeline files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Em => "em",
+            Self::Paper => "paper",
+        }
+    }
+}
+
 /// `[output]`: what is written, and where.
 #[derive(Debug, Clone, Serialize)]
 pub struct OutputConfig {

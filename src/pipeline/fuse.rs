@@ -6,7 +6,7 @@ use super::stages::Ground;
 use crate::fuse::{Fusion, MixtureSettings, Observation, Weights, fuse_mixture};
 
 /// Fuses the detections on the ground by the run's method.
-pub(super) fn fuse(config: &Config, ground: &Ground, observer: &dyn Observer) -> Fusion {
+pub fn fuse(config: &Config, ground: &Ground, observer: &dyn Observer) -> Fusion {
     observer.begin("fuse", None);
     let observations: Vec<Observation> = ground
         .placed

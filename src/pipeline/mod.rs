@@ -20,9 +20,12 @@ pub use config::{
     TerrainConfig, ViewConfig,
 };
 pub use digest::InputFile;
+pub(crate) use digest::hexadecimal;
+pub use fuse::fuse;
 pub use observer::{Observer, Silent};
 pub use paths::{DEFAULT_DATA, Source};
 pub use pictures::PictureDigest;
+pub(crate) use publish::may_replace;
 pub use read::{Inputs, read};
 pub use stages::{Ground, Settings};
 pub use summary::{FileCount, Stage, Summary};
@@ -49,6 +52,13 @@ pub fn run(config: &Config, force: bool, observer: &dyn Observer) -> Result<Summ
     let map = publish::Map::new(config, &inputs, &ground, &fusion, run_id);
     let written = clock.stage("publish", || map.write(&folder, observer))?;
     map.finish(folder, written, clock)
+}
+
+/// Puts the detections of a run on the ground and traces what its views could have seen: the stages
+/// between [`read()`] and [`fuse()`], in memory.
+pub fn place(config: &Config, inputs: &Inputs, observer: &dyn Observer) -> Ground {
+    let placed = stages::project(config, inputs, observer);
+    stages::footprint(config, inputs, placed, observer)
 }
 
 /// The same up to the ground: every detection by itself, with footprints and rejects.

@@ -18,7 +18,7 @@ use crate::publish::{Folder, Picture, Product, Rock, Scene, annotate, reject_tab
 use crate::view::View;
 
 /// A folder that holds another run is replaced only where that is asked for.
-pub(super) fn may_replace(folder: &Folder, run_id: &str, force: bool) -> Result<(), Error> {
+pub(crate) fn may_replace(folder: &Folder, run_id: &str, force: bool) -> Result<(), Error> {
     match folder.earlier_run() {
         Some(earlier) if earlier != run_id && !force => {
             let place = Place::file(folder.target().display().to_string());
@@ -80,16 +80,7 @@ impl<'a> Map<'a> {
             inputs,
             ground,
             fusion: None,
-            scene: Scene {
-                site: &inputs.site,
-                terrain: inputs.terrain.as_ref(),
-                views: &inputs.views,
-                detections: &inputs.detections,
-                placed: &ground.placed,
-                footprints: &ground.footprints,
-                classes: &ground.classes,
-                aim: config.view.aim,
-            },
+            scene: ground.scene(config, inputs),
             rocks: Vec::new(),
             run_id,
         }

@@ -12,6 +12,7 @@ use crate::error::Error;
 use crate::footprint::{Footprints, Reach, trace};
 use crate::input::Reject;
 use crate::project::{self, MarkNoise, Placed};
+use crate::publish::Scene;
 
 /// How detections are read, as the projection takes it.
 pub type Settings = project::Settings;
@@ -26,6 +27,22 @@ pub struct Ground {
     pub footprints: Footprints,
     /// Names of the classes, sorted; no class first.
     pub classes: Vec<Option<String>>,
+}
+
+impl Ground {
+    /// The run as publishing takes it.
+    pub fn scene<'a>(&'a self, config: &Config, inputs: &'a Inputs) -> Scene<'a> {
+        Scene {
+            site: &inputs.site,
+            terrain: inputs.terrain.as_ref(),
+            views: &inputs.views,
+            detections: &inputs.detections,
+            placed: &self.placed,
+            footprints: &self.footprints,
+            classes: &self.classes,
+            aim: config.view.aim,
+        }
+    }
 }
 
 impl Config {

@@ -11,6 +11,7 @@ mod layers;
 pub mod picture;
 mod rock;
 mod scene;
+pub(crate) mod svg;
 mod tables;
 
 pub use annotate::{Annotation, annotate};
@@ -47,6 +48,11 @@ impl Scene<'_> {
         rock::rocks(self, &fusion.objects)
     }
 
+    /// rocks.geojson alone.
+    pub fn rocks_geojson(&self, rocks: &[Rock], run_id: &str) -> Product {
+        Product::new("rocks.geojson", self.rocks(rocks, run_id).to_text())
+    }
+
     /// The map's layers and tables.
     ///
     /// # Errors
@@ -58,7 +64,7 @@ impl Scene<'_> {
         site_name: &str,
     ) -> Result<Vec<Product>, Error> {
         Ok(vec![
-            Product::new("rocks.geojson", self.rocks(rocks, run_id).to_text()),
+            self.rocks_geojson(rocks, run_id),
             Product::new("ellipses.geojson", self.ellipses(rocks).to_text()),
             Product::new("footprints.geojson", self.footprint_layer(rocks).to_text()),
             Product::new("views.geojson", self.view_layer().to_text()),

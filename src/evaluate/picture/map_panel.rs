@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::super::Evaluation;
 use super::super::comparison::{ComparedEstimate, Comparison, EstimateOutcome, TruthOutcome};
 use super::Symbol;
-use super::svg::{Frame, Svg, escaped, labelled, line, round_length, text, title};
 use crate::frame::{Ellipse, Enu, Point, covariance_ellipse};
+use crate::publish::svg::{Frame, Svg, escaped, labelled, line, round_length, text, title};
 
 /// More objects than this are drawn without titles, which would double the file.
 const MOST_TITLED: usize = 20_000;

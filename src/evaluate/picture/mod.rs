@@ -2,11 +2,10 @@
 
 mod map_panel;
 mod side_panels;
-mod svg;
 
 use super::Evaluation;
 use super::comparison::{EstimateOutcome, TruthOutcome};
-use svg::{Frame, Svg, text};
+use crate::publish::svg::{Frame, Svg, text};
 
 /// Outer margin, pixels.
 const MARGIN: f64 = 24.0;

@@ -1,8 +1,8 @@
 //! The legend with its counts, the errors of the matches, and the reliability of probabilities.
 
 use super::super::{Evaluation, Existence};
-use super::svg::{Frame, Svg, labelled, line, round_length, text};
 use super::{SIDE_WIDTH, Symbol};
+use crate::publish::svg::{Frame, Svg, labelled, line, round_length, text};
 
 /// Height of a line of the legend, pixels.
 const LINE: f64 = 22.0;

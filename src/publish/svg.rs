@@ -1,4 +1,4 @@
-//! The little of SVG that the picture needs.
+//! The little of SVG that maps and plots need.
 
 /// An SVG document as it grows.
 pub struct Svg {
