@@ -15,8 +15,11 @@
 //! | [`project`] | a detection on the ground, with its uncertainty |
 //! | [`fuse`] | detections of many views to one map of objects |
 //! | [`footprint`] | what a view could have seen |
+//! | [`adjust`] | places of objects and errors of poses that agree best with the measurements |
+//! | [`existence`] | which objects are real, and how often real ones are detected |
 //! | [`publish`] | maps, tables, annotated pictures |
 //! | [`evaluate`] | a map against truth |
+//! | [`bound`] | the best map that labelled detections allow |
 //! | [`pipeline`] | a pipeline file to a map |
 //! | [`cli`] | the command line |
 
@@ -37,9 +40,14 @@ pub mod fuse;
 
 pub mod footprint;
 
+pub mod adjust;
+pub mod existence;
+
 pub mod publish;
 
 pub mod evaluate;
+
+pub mod bound;
 
 pub mod pipeline;
 
