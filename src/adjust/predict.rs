@@ -10,6 +10,10 @@ use crate::frame::{self, Body, Enu, LocalEnu, Point, Ray, RigidTransform, Vector
 use crate::project::Range;
 use crate::view::View;
 
+/// Objects nearer to a camera than this are not seen by it, metres: a solution on its way through a
+/// camera would meet derivatives without bounds.
+const NEAREST_M: f64 = 0.05;
+
 /// A view with its pose set right by an estimate of its error.
 #[derive(Debug, Clone)]
 pub struct CorrectedPose<'a> {
@@ -88,6 +92,9 @@ impl<'a> CorrectedPose<'a> {
         let (place, by_state) = place(problem, point)?;
         let in_body = self.enu_from_body.inverse() * place;
         let in_camera = self.body_from_camera.inverse() * in_body;
+        if in_camera.xyz.norm() < NEAREST_M {
+            return None;
+        }
         let (pixel, by_camera) = camera.pixel_with_jacobian(in_camera).ok()?;
         let by_body = by_camera * self.body_from_camera.rotation.matrix().transpose();
         let mut rows = Matrix3::zeros();

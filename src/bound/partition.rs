@@ -1,6 +1,6 @@
 //! Which measurements are of one object, by the labels.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::error::{Fault, Place};
 use crate::evaluate::{DetectionKey, Labels};
@@ -19,8 +19,9 @@ pub struct Group {
 pub struct Partition {
     /// One group an object, and one a clutter detection, in the order of their first members.
     pub groups: Vec<Group>,
-    /// How many measurements no label names; they are in no group.
-    pub n_unlabelled: usize,
+    /// How many measurements no label names, or whose object is not in the truth (things that
+    /// move, for one); they are in no group.
+    pub n_left_out: usize,
 }
 
 impl Partition {
@@ -30,7 +31,7 @@ impl Partition {
         let mut known: BTreeMap<&str, usize> = BTreeMap::new();
         for (member, label) in labels.into_iter().enumerate() {
             let Some(label) = label else {
-                partition.n_unlabelled += 1;
+                partition.n_left_out += 1;
                 continue;
             };
             if let Some(&group) = label.and_then(|name| known.get(name)) {
@@ -48,11 +49,16 @@ impl Partition {
         partition
     }
 
-    /// Of detections named by image and detection, in the order of their measurements.
+    /// Of detections named by image and detection, in the order of their measurements; objects
+    /// that are not among the `known` ones are left out.
     ///
     /// # Errors
     /// Labels that do not name the image, where the same `det_id` stands in several.
-    pub fn of_labels(labels: &Labels, detections: &[DetectionKey]) -> Result<Self, Fault> {
+    pub fn of_labels(
+        labels: &Labels,
+        detections: &[DetectionKey],
+        known: &BTreeSet<&str>,
+    ) -> Result<Self, Fault> {
         let mut keys = detections.to_vec();
         if !labels.by_image {
             keys.iter_mut().for_each(|key| key.image_id.clear());
@@ -68,8 +74,10 @@ impl Partition {
             }
         }
         Ok(Self::new(keys.iter().map(|key| {
-            let label = labels.object_of.get(key)?;
-            Some(label.as_deref())
+            let label = labels.object_of.get(key)?.as_deref();
+            label
+                .is_none_or(|name| known.contains(name))
+                .then_some(label)
         })))
     }
 
@@ -97,7 +105,7 @@ mod tests {
         let partition = Partition::new(labels);
         let members: Vec<&[usize]> = partition.groups.iter().map(|g| &g.members[..]).collect();
         assert_eq!(members, [&[0, 5][..], &[1], &[3], &[4]]);
-        assert_eq!(partition.n_unlabelled, 1);
+        assert_eq!(partition.n_left_out, 1);
         let objects = partition.objects();
         let names: Vec<_> = objects.iter().filter_map(|g| g.label.as_deref()).collect();
         assert_eq!(names, ["b", "a"]);
@@ -114,13 +122,19 @@ mod tests {
     fn labels_without_an_image_serve_where_det_ids_are_unique() {
         let labels = Labels {
             file: "labels.csv".into(),
-            object_of: [(key("", "1"), Some("a".into())), (key("", "2"), None)].into(),
+            object_of: [
+                (key("", "1"), Some("a".into())),
+                (key("", "2"), None),
+                (key("", "3"), Some("moving".into())),
+            ]
+            .into(),
             by_image: false,
         };
-        let found = Partition::of_labels(&labels, &[key("x", "1"), key("y", "2"), key("y", "3")]);
-        let found = found.unwrap();
-        assert_eq!((found.groups.len(), found.n_unlabelled), (2, 1));
-        let twice = Partition::of_labels(&labels, &[key("x", "1"), key("y", "1")]);
+        let known = BTreeSet::from(["a"]);
+        let keys = [key("x", "1"), key("y", "2"), key("y", "3"), key("y", "4")];
+        let found = Partition::of_labels(&labels, &keys, &known).unwrap();
+        assert_eq!((found.groups.len(), found.n_left_out), (2, 2));
+        let twice = Partition::of_labels(&labels, &[key("x", "1"), key("y", "1")], &known);
         assert_eq!(
             twice.unwrap_err().to_string(),
             "labels.csv:1: image_id: found no such column, \
