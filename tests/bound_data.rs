@@ -22,29 +22,20 @@ fn data(set: &str) -> Option<PathBuf> {
 }
 
 /// Solves a bound and holds it against the truth.
-fn score(
-    folder: &Path,
-    pipeline: &str,
-    set: &[&str],
-    kind: Bound,
-    radius_m: f64,
-) -> (Report, Bounded) {
+fn score(folder: &Path, pipeline: &str, kind: Bound) -> (Report, Bounded) {
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("pipelines")
         .join(pipeline);
     let overrides = Overrides {
         data: Some(folder.to_owned()),
         out: None,
-        set: set.iter().map(|s| (*s).to_owned()).collect(),
+        set: Vec::new(),
     };
     let config = Config::read(&pipeline, &overrides).unwrap();
     let labels = folder.join("labels.csv");
     let objects = read_truth(&folder.join("truth.csv"), "truth.csv").unwrap();
     let bounded = bound(&config, &labels, &objects, kind, &Silent).unwrap();
-    let options = Options {
-        radius_m,
-        ..Options::default()
-    };
+    let options = Options::default();
     let ignore = folder.join("ignore.csv");
     let truth = Truth {
         objects,
@@ -61,45 +52,38 @@ fn score(
     (report, bounded)
 }
 
+fn is_clairvoyant(set: &str, pipeline: &str, n: usize, worst_m: f64) {
+    let Some(folder) = data(set) else { return };
+    let (report, bounded) = score(&folder, pipeline, Bound::Clairvoyant);
+    let found = &report.detection;
+    assert!(bounded.solver.converged, "{set}: {:?}", bounded.solver);
+    assert_eq!((found.n_matched, found.n_missed, found.n_false), (n, 0, 0));
+    let rmse_m = found.rmse_m.unwrap();
+    assert!(rmse_m < worst_m, "{set}: {rmse_m}");
+    let association = report.association.unwrap();
+    assert_eq!(association.purity, Some(1.0));
+    assert_eq!(association.completeness, Some(1.0));
+}
+
+/// Landmarks by range and bearing, hundreds of views of a dozen objects. With identities known and
+/// poses left as they are the Python prototype comes to 0.065, 0.070 and 0.031 m.
 #[test]
-fn explore() {
-    for (set, pipeline, radius_m) in [
-        ("mrclam-1", "mrclam.toml", 0.3),
-        ("mrclam-2", "mrclam.toml", 0.3),
-        ("mrclam-3", "mrclam.toml", 0.3),
-        ("mrclam-4", "mrclam.toml", 0.3),
-        ("mrclam-5", "mrclam.toml", 0.3),
-        ("mrclam-9", "mrclam.toml", 0.3),
-        ("copr-kite", "copr-kite.toml", 0.3),
-        ("kitti-0001", "kitti.toml", 3.0),
-        ("kitti-0011", "kitti.toml", 3.0),
-        ("kitti-0014", "kitti.toml", 3.0),
-        ("kitti-0000", "kitti.toml", 3.0),
-    ] {
-        let Some(folder) = data(set) else { return };
-        for kind in [Bound::Clairvoyant, Bound::Fair] {
-            if kind == Bound::Fair && set.starts_with("mrclam") {
-                continue;
-            }
-            let start = std::time::Instant::now();
-            let (report, bounded) = score(&folder, pipeline, &[], kind, radius_m);
-            let d = &report.detection;
-            println!(
-                "{set} {kind:?}: f1 {:?} rmse {:?} match {} miss {} false {} gospa {:.3} nees {:?} purity {:?} {} steps, move {:.1e} unl {} unus {} {:.2} s",
-                d.f1,
-                d.rmse_m,
-                d.n_matched,
-                d.n_missed,
-                d.n_false,
-                report.gospa.gospa_m,
-                report.consistency.nees,
-                report.association.as_ref().unwrap().purity,
-                bounded.solver.iterations,
-                bounded.solver.last_move_m,
-                bounded.n_left_out,
-                bounded.n_unusable,
-                start.elapsed().as_secs_f64()
-            );
-        }
-    }
+fn landmarks_of_mrclam() {
+    is_clairvoyant("mrclam-1", "mrclam.toml", 11, 0.06);
+    is_clairvoyant("mrclam-2", "mrclam.toml", 13, 0.08);
+    is_clairvoyant("mrclam-3", "mrclam.toml", 14, 0.032);
+}
+
+/// Boxes in pictures from a kite, over flat ground of unknown height to a few centimetres. Without
+/// labels of what is real, two false boxes that were seen twice pass for objects.
+#[test]
+fn targets_under_a_kite() {
+    is_clairvoyant("copr-kite", "copr-kite.toml", 10, 0.014);
+    let Some(folder) = data("copr-kite") else {
+        return;
+    };
+    let (report, _) = score(&folder, "copr-kite.toml", Bound::Fair);
+    assert_eq!(report.detection.n_missed, 0);
+    assert!(report.detection.n_false <= 2);
+    assert!(report.detection.rmse_m.unwrap() < 0.014);
 }

@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{Vector2, Vector3, Vector6};
+use nalgebra::{SMatrix, SVector, Vector2, Vector3, Vector6};
 use rockmap::adjust::{LevelPlane, Measurement, Problem, Reading};
 use rockmap::bound::{BoundMap, Fair, Partition, clairvoyant, fair};
 use rockmap::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
@@ -180,14 +180,13 @@ fn deviation<const N: usize>(
     let mut worst = (0.0f64, 0.0f64);
     for object in &map.objects {
         let (place, covariance) = reference(object.observations[0]);
-        let size: f64 = (0..N).map(|i| covariance[i][i]).sum();
-        for i in 0..N {
-            worst.0 = worst.0.max((object.place.xyz[i] - place[i]).abs());
-            for j in 0..N {
-                let away = (object.covariance[(i, j)] - covariance[i][j]).abs();
-                worst.1 = worst.1.max(away / size);
-            }
-        }
+        let place = SVector::from(place);
+        // The reference holds rows, nalgebra columns; a covariance is its own transpose.
+        let covariance = SMatrix::from(covariance);
+        let away_m = object.place.xyz.fixed_rows::<N>(0) - place;
+        let away = object.covariance.fixed_view::<N, N>(0, 0) - covariance;
+        worst.0 = worst.0.max(away_m.amax());
+        worst.1 = worst.1.max(away.amax() / covariance.trace());
     }
     worst
 }
@@ -393,4 +392,72 @@ fn derivatives_agree_with_differences() {
             );
         }
     }
+}
+
+#[test]
+fn the_same_bytes_at_any_number_of_threads() {
+    let scene = scene("small.json");
+    let solve = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let map = pool.build().unwrap().install(|| fair_map(&scene, 0.05));
+        format!("{map:?}")
+    };
+    let one = solve(1);
+    assert_eq!(one, solve(2));
+    assert_eq!(one, solve(5));
+}
+
+#[test]
+fn what_has_no_bound_says_why() {
+    let scene = scene("small.json");
+    let (mut views, measurements) = (scene.views(), scene.measurements());
+    let plane = LevelPlane::default();
+    let nothing = Partition::new(scene.object.iter().map(|_| None));
+    let clutter = Partition::new(scene.object.iter().map(|_| Some(None)));
+    let flat = problem(&views, &measurements, &plane, 0.0);
+    for partition in [&nothing, &clutter] {
+        assert_eq!(
+            clairvoyant(&flat, partition).unwrap_err().to_string(),
+            "found no labelled detection that can be placed, expected at least one"
+        );
+    }
+    views[3].camera = None;
+    let exposure = Exposure {
+        area_m2: 1.0,
+        shares: vec![1.0; views.len()],
+    };
+    let data = Fair {
+        problem: &problem(&views, &measurements, &plane, 0.0),
+        exposure: &exposure,
+        prior: &Prior::default(),
+    };
+    assert_eq!(
+        fair(&data, &scene.partition()).unwrap_err().to_string(),
+        "found views without a camera, expected a camera for every view: \
+         the fair bound weighs what a picture does not show"
+    );
+}
+
+/// Poses that are known exactly leave every object to its own measurements.
+#[test]
+fn without_pose_errors_objects_are_independent() {
+    let scene = scene("small.json");
+    let (mut views, measurements) = (scene.views(), scene.measurements());
+    for view in &mut views {
+        view.pose.sigma = PoseSigma::from_vector(Vector6::zeros());
+    }
+    let plane = LevelPlane::default();
+    let problem = problem(&views, &measurements, &plane, 0.0);
+    let whole = clairvoyant(&problem, &scene.partition()).unwrap();
+    let one = scene.partition().objects().swap_remove(5);
+    let alone = Partition {
+        groups: vec![one.clone()],
+        n_left_out: 0,
+    };
+    let alone = clairvoyant(&problem, &alone).unwrap();
+    let found = whole.objects.iter().find(|o| o.label == one.label).unwrap();
+    assert!(found.place.distance(alone.objects[0].place) < 1e-7);
+    let covariance = found.covariance - alone.objects[0].covariance;
+    assert!(covariance.amax() < 1e-9 && found.covariance.trace() > 1e-7);
+    assert!(whole.poses.iter().all(|p| p.amax() < 1e-7));
 }

@@ -190,7 +190,7 @@ mod tests {
                 if i == j {
                     value += 12.0;
                 }
-                let unit = |k: usize| if k % 2 == 0 { 1.0 } else { 1e4 };
+                let unit = |k: usize| if k.is_multiple_of(2) { 1.0 } else { 1e4 };
                 let value = value * unit(i) * unit(j);
                 envelope.add(i, j, value);
                 dense[(i, j)] = value;

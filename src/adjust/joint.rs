@@ -159,6 +159,10 @@ impl<'a> Adjustment<'a> {
         let predictions = self.predictions(state);
         let normal = Normal::new(self, state, &predictions);
         let (points, poses, marginals) = normal.solve(marginals).ok_or(NoSolution)?;
+        let moved = points.iter().all(|x| x.iter().all(|c| c.is_finite()));
+        if !moved {
+            return Err(NoSolution);
+        }
         let mut move_m = 0.0f64;
         for (point, mut step) in state.points.iter_mut().zip(points) {
             if self.problem.is_pinned() {

@@ -5,8 +5,10 @@
 //! object its east, its north and its height above the [`Surface`], of every view the six errors of
 //! its pose. [`Adjustment`] minimises
 //!
-//! `sum over edges of w (z - h(x, p))^T R^-1 (z - h(x, p)) + sum over views of d^T L d
-//!  + sum over objects of height^2 / sigma_z^2`
+//! ```text
+//! sum over edges of w (z - h(x, p))^T R^-1 (z - h(x, p))
+//!   + sum over views of d^T L d + sum over objects of height^2 / sigma_z^2
+//! ```
 //!
 //! by Gauss-Newton steps, with whichever of objects and poses are more eliminated by a Schur
 //! complement and a sparse Cholesky factor of the rest. Where the height of the ground is known

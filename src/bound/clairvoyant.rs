@@ -1,12 +1,12 @@
 //! The bound of a method that knows which detection is which object.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector6;
 
 use super::{BoundEvidence, BoundMap, Group, NoBound, Partition, objects, starts};
 use crate::adjust::{Adjustment, Edge, Noise, Problem, State};
 
 /// Steps are over where no object moves farther, metres.
-const STILL_M: f64 = 1e-9;
+const STILL_M: f64 = 1e-8;
 /// At most this many steps.
 const STEPS: usize = 50;
 
@@ -17,7 +17,7 @@ const STEPS: usize = 50;
 /// [`NoBound`] where no object is labelled or the equations are singular.
 pub fn clairvoyant(problem: &Problem<'_>, partition: &Partition) -> Result<BoundMap, NoBound> {
     let mut groups = partition.objects();
-    let points = nearest(problem, &mut groups);
+    let points = starts(problem, &mut groups);
     if groups.is_empty() {
         return Err(NoBound::NothingLabelled);
     }
@@ -46,22 +46,6 @@ pub fn clairvoyant(problem: &Problem<'_>, partition: &Partition) -> Result<Bound
             model: None,
         },
     })
-}
-
-/// Every object starts where its nearest measurement meets the ground: near ones say most. Groups
-/// whose measurements meet none are dropped.
-fn nearest(problem: &Problem<'_>, groups: &mut Vec<Group>) -> Vec<Vector3<f64>> {
-    let mut points = Vec::with_capacity(groups.len());
-    let mut starts = starts(problem, groups).into_iter();
-    groups.retain(|_| {
-        let places = starts.next().unwrap_or_default();
-        let Some((_, [east, north])) = places.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else {
-            return false;
-        };
-        points.push(Vector3::new(east, north, 0.0));
-        true
-    });
-    points
 }
 
 /// One edge of full weight a member, by measurement.

@@ -3,7 +3,7 @@
 use nalgebra::{Vector3, Vector6};
 
 use super::clairvoyant::edges;
-use super::{BoundEvidence, BoundMap, Group, NoBound, Partition, objects, starts};
+use super::{BoundEvidence, BoundMap, NoBound, Partition, objects, starts};
 use crate::adjust::{Adjustment, Conditional, Edge, NoSolution, Problem, State, Step};
 use crate::existence::{
     Belief, Exposure, Model, Pairs, Prior, Sizes, clutter_log_intensity, learn, log_odds,
@@ -38,7 +38,7 @@ pub fn fair(data: &Fair<'_>, partition: &Partition) -> Result<BoundMap, NoBound>
         return Err(NoBound::NoCamera);
     }
     let mut groups = partition.groups.clone();
-    let points = middles(data.problem, &mut groups);
+    let points = starts(data.problem, &mut groups);
     if groups.is_empty() {
         return Err(NoBound::NothingLabelled);
     }
@@ -59,26 +59,6 @@ pub fn fair(data: &Fair<'_>, partition: &Partition) -> Result<BoundMap, NoBound>
             model: Some(solver.model),
         },
     })
-}
-
-/// Every object starts in the middle of where its measurements meet the ground. Groups whose
-/// measurements meet none are dropped.
-fn middles(problem: &Problem<'_>, groups: &mut Vec<Group>) -> Vec<Vector3<f64>> {
-    let mut points = Vec::with_capacity(groups.len());
-    let mut starts = starts(problem, groups).into_iter();
-    groups.retain(|_| {
-        let places = starts.next().unwrap_or_default();
-        let (mut sum, mut n) = (Vector3::zeros(), 0.0);
-        for (_, [east, north]) in &places {
-            sum += Vector3::new(*east, *north, 0.0);
-            n += 1.0;
-        }
-        if n > 0.0 {
-            points.push(sum / n);
-        }
-        n > 0.0
-    });
-    points
 }
 
 /// The unknowns and everything learnt, on the way.

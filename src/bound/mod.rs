@@ -16,12 +16,12 @@ pub use clairvoyant::clairvoyant;
 pub use fair::{Fair, fair};
 pub use partition::{Group, Partition};
 
-use nalgebra::{Matrix3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 use serde::Serialize;
 
-use crate::adjust::{Marginals, NoSolution, Problem, State, Surface};
+use crate::adjust::{CorrectedPose, Marginals, NoSolution, Problem, Reading, State, Surface};
 use crate::existence::Model;
-use crate::frame::{Enu, Point};
+use crate::frame::{Enu, Point, Ray};
 
 /// A bound's map.
 #[derive(Debug, Clone)]
@@ -57,7 +57,7 @@ pub struct BoundEvidence {
     pub iterations: usize,
     /// Longest move of an object in the last step, metres.
     pub last_move_m: f64,
-    /// Whether it was below a nanometre, or for the fair bound a tenth of a millimetre.
+    /// Whether it was below ten nanometres, or for the fair bound a tenth of a millimetre.
     pub converged: bool,
     /// What was learnt of noise, clutter and detectability, where the bound learns.
     #[serde(skip)]
@@ -105,37 +105,35 @@ fn objects(
         .collect()
 }
 
-/// Where the measurements of every group meet the ground: east and north of each, with the ground
-/// range, under the poses as measured.
-fn starts(problem: &Problem<'_>, groups: &[Group]) -> Vec<Vec<(f64, [f64; 2])>> {
-    use crate::adjust::CorrectedPose;
+/// Where every object starts: where its nearest measurement meets the ground, for near ones say
+/// most. Groups whose measurements meet none are dropped.
+fn starts(problem: &Problem<'_>, groups: &mut Vec<Group>) -> Vec<Vector3<f64>> {
     let still = Vector6::zeros();
-    let poses: Vec<CorrectedPose<'_>> = problem
-        .views
-        .iter()
-        .map(|v| CorrectedPose::new(v, &still))
-        .collect();
+    let views = problem.views.iter();
+    let poses: Vec<CorrectedPose<'_>> = views.map(|v| CorrectedPose::new(v, &still)).collect();
     let start = |&member: &usize| {
         let measurement = &problem.measurements[member];
         let pose = &poses[measurement.view];
         let ray = pose.ray(&measurement.reading)?;
-        let origin = pose.origin();
-        let place = match measured_range_m(problem, member) {
+        let place = match measured_range_m(&measurement.reading) {
             Some(range_m) => ray.at(range_m),
             None => hit(problem.surface, ray, problem.limit_m())?,
         };
-        let range_m = origin.horizontal_distance(place);
-        Some((range_m, [place.xyz.x, place.xyz.y]))
+        let range_m = ray.origin.horizontal_distance(place);
+        Some((range_m, Vector3::new(place.xyz.x, place.xyz.y, 0.0)))
     };
-    groups
-        .iter()
-        .map(|group| group.members.iter().filter_map(start).collect())
-        .collect()
+    let mut points = Vec::with_capacity(groups.len());
+    groups.retain(|group| {
+        let places = group.members.iter().filter_map(start);
+        let nearest = places.min_by(|a, b| a.0.total_cmp(&b.0));
+        points.extend(nearest.map(|(_, place)| place));
+        nearest.is_some()
+    });
+    points
 }
 
-fn measured_range_m(problem: &Problem<'_>, member: usize) -> Option<f64> {
-    use crate::adjust::Reading;
-    match problem.measurements[member].reading {
+fn measured_range_m(reading: &Reading) -> Option<f64> {
+    match reading {
         Reading::Pixel { range, .. } => range.map(|r| r.range_m),
         Reading::Bearing { range, .. } => Some(range.range_m),
     }
@@ -143,7 +141,7 @@ fn measured_range_m(problem: &Problem<'_>, member: usize) -> Option<f64> {
 
 /// The ground a ray meets, however far; where it meets none, the ground at the limit of what is
 /// trusted along its azimuth.
-fn hit(surface: &dyn Surface, ray: crate::frame::Ray<Enu>, limit_m: f64) -> Option<Point<Enu>> {
+fn hit(surface: &dyn Surface, ray: Ray<Enu>, limit_m: f64) -> Option<Point<Enu>> {
     if let Some(hit) = surface.first_hit(ray, f64::INFINITY) {
         return Some(hit);
     }

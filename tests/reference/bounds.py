@@ -29,6 +29,7 @@ SIGMA = np.array([0.05, 0.05, 0.02, *np.radians([0.25, 0.25, 0.4])])
 SCENES = dict(
     small=dict(seed=4, nrock=110, L=5, nviews=8, maxr=14, ybox=7),
     default=dict(seed=0),
+    long=dict(seed=1, nrock=2500, L=160, nviews=300),
 )
 
 
