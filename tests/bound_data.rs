@@ -74,8 +74,8 @@ fn landmarks_of_mrclam() {
     is_clairvoyant("mrclam-3", "mrclam.toml", 14, 0.032);
 }
 
-/// Boxes in pictures from a kite, over flat ground of unknown height to a few centimetres. Without
-/// labels of what is real, two false boxes that were seen twice pass for objects.
+/// Boxes in pictures from a kite. Told only what belongs together, the fair bound takes two lone false
+/// boxes for objects.
 #[test]
 fn targets_under_a_kite() {
     is_clairvoyant("copr-kite", "copr-kite.toml", 10, 0.014);

@@ -351,6 +351,12 @@ fn derivatives_agree_with_differences() {
             sigma: 0.01,
             range,
         },
+        Reading::Bearing {
+            bearing: 1.4,
+            is_azimuth: true,
+            sigma: 0.01,
+            range,
+        },
     ];
     let views = [view];
     let delta = Vector6::new(0.1, -0.2, 0.05, 0.3, -0.2, 0.25);
@@ -369,7 +375,15 @@ fn derivatives_agree_with_differences() {
         let point = Vector3::new(6.5, 2.0, 0.1);
         let here = residual(point, delta);
         let scale = here.by_pose.amax();
-        for i in 0..6 {
+        // An azimuth is taken not to turn with the platform, the arm of its camera neither.
+        let is_azimuth = matches!(
+            reading,
+            Reading::Bearing {
+                is_azimuth: true,
+                ..
+            }
+        );
+        for i in 0..if is_azimuth { 3 } else { 6 } {
             let mut step = Vector6::zeros();
             step[i] = 1e-5;
             let after = residual(point, delta + step).residual;
@@ -460,4 +474,57 @@ fn without_pose_errors_objects_are_independent() {
     let covariance = found.covariance - alone.objects[0].covariance;
     assert!(covariance.amax() < 1e-9 && found.covariance.trace() > 1e-7);
     assert!(whole.poses.iter().all(|p| p.amax() < 1e-7));
+}
+
+/// A box says the width of what it shows, unless the picture's border cuts it.
+#[test]
+fn detections_become_measurements() {
+    use rockmap::detection::{Aim, Detection, Mark, MarkSigma, PixelBox};
+    use rockmap::project::{MarkNoise, Settings};
+    let scene = scene("small.json");
+    let views = scene.views();
+    let settings = Settings {
+        aim: Aim::BOTTOM,
+        min_range_m: 0.0,
+        max_range_m: 14.0,
+        min_score: 0.5,
+        noise: MarkNoise {
+            pixel_px: 1.5,
+            range_m: 0.1,
+            bearing: 0.01,
+        },
+    };
+    let detection = |x_min: f64, score: f64| Detection {
+        image_id: "000".into(),
+        det_id: "1".into(),
+        class: None,
+        score: Some(score),
+        diameter_m: None,
+        mark: Mark::Box(PixelBox {
+            x_min,
+            y_min: 100.0,
+            x_max: x_min + 30.0,
+            y_max: 140.0,
+        }),
+        range_m: None,
+        sigma: MarkSigma {
+            v_px: Some(3.0),
+            ..MarkSigma::default()
+        },
+        file: 0,
+        line: 2,
+    };
+    let measure =
+        |x_min, score| Measurement::new(&detection(x_min, score), (7, &views[0]), &settings);
+    let whole = measure(200.0, 0.9).unwrap();
+    assert_eq!(whole.view, 7);
+    assert_eq!(whole.log_size, Some(30f64.ln()));
+    assert_eq!(whole.reading.values(), Vector3::new(215.0, 140.0, 0.0));
+    assert_eq!(whole.reading.sigmas(), Vector3::new(1.5, 3.0, 1.0));
+    assert_eq!(whole.reading.n_rows(), 2);
+    assert_eq!(measure(-10.0, 0.9).unwrap().log_size, None);
+    assert_eq!(
+        measure(200.0, 0.4).unwrap_err().to_string(),
+        "score 0.4 is below min_score = 0.5"
+    );
 }
