@@ -15,9 +15,12 @@
 //! | [`project`] | a detection on the ground, with its uncertainty |
 //! | [`fuse`] | detections of many views to one map of objects |
 //! | [`footprint`] | what a view could have seen |
+//! | [`adjust`] | places of objects and errors of poses that agree best with the measurements |
+//! | [`existence`] | which objects are real, and how often real ones are detected |
 //! | [`publish`] | maps, tables, annotated pictures |
 //! | [`evaluate`] | a map against truth |
 //! | [`simulate`] | scenes with known truth: traverses, detectors, rendered pictures |
+//! | [`bound`] | the best map that labelled detections allow |
 //! | [`pipeline`] | a pipeline file to a map |
 //! | [`experiment`] | the paper's experiments, and a bench of methods over scenes |
 //! | [`cli`] | the command line |
@@ -39,11 +42,16 @@ pub mod fuse;
 
 pub mod footprint;
 
+pub mod adjust;
+pub mod existence;
+
 pub mod publish;
 
 pub mod evaluate;
 
 pub mod simulate;
+
+pub mod bound;
 
 pub mod pipeline;
 

@@ -2,6 +2,7 @@
 //!
 //! The top functions read as the walk of a night's data: [`run`], [`project`] and [`check`].
 
+mod bound;
 mod checks;
 mod config;
 mod digest;
@@ -15,6 +16,7 @@ mod read;
 mod stages;
 mod summary;
 
+pub use bound::{Bound, Bounded, bound};
 pub use config::{
     Config, FusionConfig, InputConfig, Method, NoiseConfig, OutputConfig, Overrides, SiteConfig,
     TerrainConfig, ViewConfig,
