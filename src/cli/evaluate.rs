@@ -1,10 +1,11 @@
 //! `rockmap evaluate`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::error::Error;
-use crate::evaluate::{self, Options, Sources};
+use crate::evaluate::{self, Comparison, Options, Report, Sources, Truth, associate, read_labels};
+use crate::pipeline::{self, Bound, Config, Overrides, Silent};
 
 /// What `rockmap evaluate` takes.
 #[derive(Debug, clap::Args)]
@@ -39,12 +40,66 @@ pub(super) struct Args {
     /// Objects match only within their class
     #[arg(long)]
     by_class: bool,
+    /// Score the best possible map of the same data too; may be given twice
+    #[arg(long, value_name = "BOUND", requires = "labels")]
+    bound: Vec<BoundName>,
+    /// The pipeline file the bounds take data and noise from; default: pipeline.toml beside the labels
+    #[arg(long, value_name = "PIPELINE.toml", requires = "bound")]
+    pipeline: Option<PathBuf>,
+    /// Take the bounds' input files from this folder instead of the pipeline's own
+    #[arg(long, value_name = "DIR", requires = "bound")]
+    data: Option<PathBuf>,
     /// Print the scores as JSON
     #[arg(long)]
     json: bool,
     /// Draw map against truth into this SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+}
+
+/// A bound, as it is typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum BoundName {
+    /// All labels known: joint least squares of places and poses
+    Clairvoyant,
+    /// Known what belongs together; what is real is decided by the evidence
+    Fair,
+}
+
+impl BoundName {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Clairvoyant => "clairvoyant",
+            Self::Fair => "fair",
+        }
+    }
+}
+
+/// The report of a bound, scored as the map is.
+fn report_of(
+    bound: BoundName,
+    args: &Args,
+    labels: &Path,
+    truth: &Truth,
+    options: &Options,
+) -> Result<Report, Error> {
+    let beside = || labels.with_file_name("pipeline.toml");
+    let pipeline = args.pipeline.clone().unwrap_or_else(beside);
+    let overrides = Overrides {
+        data: args.data.clone(),
+        ..Overrides::default()
+    };
+    let config = Config::read(&pipeline, &overrides)?;
+    let kind = match bound {
+        BoundName::Clairvoyant => Bound::Clairvoyant,
+        BoundName::Fair => Bound::Fair,
+    };
+    let bounded = pipeline::bound(&config, labels, &truth.objects, kind, &Silent)?;
+    let comparison = Comparison::new(&bounded.map, truth, options)?;
+    let labels = read_labels(labels, &labels.display().to_string())?;
+    let mut report = Report::new(&comparison);
+    report.set_association(associate(&comparison, &labels, &bounded.evidence)?);
+    Ok(report)
 }
 
 pub(super) fn evaluate(args: &Args) -> Result<ExitCode, Error> {
@@ -67,12 +122,36 @@ pub(super) fn evaluate(args: &Args) -> Result<ExitCode, Error> {
         let drawing = evaluate::picture(&evaluation, &args.map.display().to_string());
         std::fs::write(path, drawing).map_err(|e| Error::io(path, "write", e))?;
     }
+    let mut bounds = Vec::new();
+    for &bound in &args.bound {
+        let Some(labels) = &args.labels else {
+            continue; // Asked for above: a bound requires them.
+        };
+        let report = report_of(bound, args, labels, &evaluation.truth, &options)?;
+        bounds.push((bound.name(), report));
+    }
     if args.json {
-        let json = serde_json::to_string_pretty(&evaluation.report)
-            .map_err(|e| Error::Output(format!("cannot write the scores as JSON: {e}")))?;
-        println!("{json}");
+        println!("{}", json(&evaluation.report, &bounds)?);
     } else {
         print!("{}", evaluation.report);
+        for (name, report) in &bounds {
+            print!("\n{name} bound\n{report}");
+        }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The map's scores as an object, with those of the bounds in its `bounds`.
+fn json(report: &Report, bounds: &[(&str, Report)]) -> Result<String, Error> {
+    let failed = |e| Error::Output(format!("cannot write the scores as JSON: {e}"));
+    let mut scores = serde_json::to_value(report).map_err(failed)?;
+    if !bounds.is_empty() {
+        let mut all = serde_json::Map::new();
+        for (name, report) in bounds {
+            let report = serde_json::to_value(report).map_err(failed)?;
+            all.insert((*name).to_owned(), report);
+        }
+        scores["bounds"] = all.into();
+    }
+    serde_json::to_string_pretty(&scores).map_err(failed)
 }

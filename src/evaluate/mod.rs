@@ -135,6 +135,8 @@ pub struct Truth {
 /// A map held against the truth.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
+    /// The truth it was held against.
+    pub truth: Truth,
     /// What became of every object.
     pub comparison: Comparison,
     /// The scores.
@@ -164,7 +166,11 @@ pub fn evaluate(sources: &Sources, options: &Options) -> Result<Evaluation, Erro
         let evidence = read_evidence(&evidence, &shown(&evidence))?;
         report.set_association(associate(&comparison, &labels, &evidence)?);
     }
-    Ok(Evaluation { comparison, report })
+    Ok(Evaluation {
+        truth,
+        comparison,
+        report,
+    })
 }
 
 fn shown(path: &Path) -> String {
