@@ -66,18 +66,18 @@ enum BoundName {
     Fair,
 }
 
-impl BoundName {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Clairvoyant => "clairvoyant",
-            Self::Fair => "fair",
+impl From<BoundName> for Bound {
+    fn from(name: BoundName) -> Self {
+        match name {
+            BoundName::Clairvoyant => Self::Clairvoyant,
+            BoundName::Fair => Self::Fair,
         }
     }
 }
 
 /// The report of a bound, scored as the map is.
 fn report_of(
-    bound: BoundName,
+    bound: Bound,
     args: &Args,
     labels: &Path,
     truth: &Truth,
@@ -90,11 +90,7 @@ fn report_of(
         ..Overrides::default()
     };
     let config = Config::read(&pipeline, &overrides)?;
-    let kind = match bound {
-        BoundName::Clairvoyant => Bound::Clairvoyant,
-        BoundName::Fair => Bound::Fair,
-    };
-    let bounded = pipeline::bound(&config, labels, &truth.objects, kind, &Silent)?;
+    let bounded = pipeline::bound(&config, labels, &truth.objects, bound, &Silent)?;
     let comparison = Comparison::new(&bounded.map, truth, options)?;
     let labels = read_labels(labels, &labels.display().to_string())?;
     let mut report = Report::new(&comparison);
@@ -123,7 +119,7 @@ pub(super) fn evaluate(args: &Args) -> Result<ExitCode, Error> {
         std::fs::write(path, drawing).map_err(|e| Error::io(path, "write", e))?;
     }
     let mut bounds = Vec::new();
-    for &bound in &args.bound {
+    for bound in args.bound.iter().map(|&name| Bound::from(name)) {
         let Some(labels) = &args.labels else {
             continue; // Asked for above: a bound requires them.
         };

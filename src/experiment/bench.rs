@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Fault, Place, suggestion};
 use crate::evaluate;
-use crate::pipeline::{Method, Observer};
+use crate::pipeline::{Bound, Method, Observer};
 use crate::simulate::Scene;
 
 pub use record::Scores;
@@ -43,18 +43,23 @@ pub struct BenchOptions {
 pub enum Contender {
     /// A fusion method.
     Method(Method),
+    /// The best map that the labels allow.
+    Bound(Bound),
 }
 
 impl Contender {
     /// All there are.
     pub fn all() -> Vec<Self> {
-        Method::ALL.into_iter().map(Self::Method).collect()
+        let bounds = [Bound::Clairvoyant, Bound::Fair].map(Self::Bound);
+        let methods = Method::ALL.into_iter().map(Self::Method);
+        methods.chain(bounds).collect()
     }
 
     /// Its name on the command line and in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Method(method) => method.name(),
+            Self::Bound(bound) => bound.name(),
         }
     }
 

@@ -30,6 +30,16 @@ pub enum Bound {
     Fair,
 }
 
+impl Bound {
+    /// Its name on the command line and in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Clairvoyant => "clairvoyant",
+            Self::Fair => "fair",
+        }
+    }
+}
+
 /// A bound's map as [`crate::evaluate`] takes maps.
 #[derive(Debug, Clone)]
 pub struct Bounded {

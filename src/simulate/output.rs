@@ -27,7 +27,7 @@ use super::scene::{PoseKey, TerrainModel};
 use super::{Simulation, View};
 
 /// What `labels.csv` calls the object of a false alarm.
-pub const NO_OBJECT: &str = "none";
+pub const NO_OBJECT: &str = "";
 
 /// Writes the data set into `dir`, which is made where it is missing. Files appear whole: they are
 /// written under a folder `.partial` and moved into place when all are there. Files of other names

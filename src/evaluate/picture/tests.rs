@@ -41,7 +41,11 @@ fn evaluation() -> Evaluation {
     };
     let comparison = Comparison::new(&map, &truth, &Options::default()).unwrap();
     let report = Report::new(&comparison);
-    Evaluation { comparison, report }
+    Evaluation {
+        truth,
+        comparison,
+        report,
+    }
 }
 
 #[test]

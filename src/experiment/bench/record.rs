@@ -11,8 +11,8 @@ use sha2::{Digest, Sha256};
 use super::table::BenchTable;
 use super::{BenchOptions, Contender};
 use crate::error::Error;
-use crate::evaluate::{self, Comparison, Report, Truth, map_from_bytes, read_truth};
-use crate::pipeline::{self, Config, Ground, Inputs, Overrides, Silent};
+use crate::evaluate::{self, Comparison, Report, RockMap, Truth, map_from_bytes, read_truth};
+use crate::pipeline::{self, Config, Ground, Inputs, Method, Overrides, Silent};
 use crate::simulate::{self, Scene};
 
 /// Part of what names a result. It goes up whenever a change of the program changes scores without
@@ -158,13 +158,15 @@ struct Run {
     inputs: Inputs,
     ground: Ground,
     truth: Truth,
+    labels: PathBuf,
 }
 
 impl Run {
     fn new(folder: &Path, options: &BenchOptions) -> Result<Self, Error> {
         // The file's own method need not be one that is compared.
-        let first = options.contenders.iter().map(|c| match c {
-            Contender::Method(method) => format!("fusion.method={}", method.name()),
+        let first = options.contenders.iter().filter_map(|c| match c {
+            Contender::Method(method) => Some(format!("fusion.method={}", method.name())),
+            Contender::Bound(_) => None,
         });
         let no_pictures = "output.annotate=false".to_owned();
         let overrides = Overrides {
@@ -187,20 +189,20 @@ impl Run {
                 objects,
                 ignored: Vec::new(),
             },
+            labels: folder.join("labels.csv"),
         })
     }
 
     fn scores(&self, contender: Contender, scoring: &evaluate::Options) -> Result<Scores, Error> {
-        let Contender::Method(method) = contender;
-        let mut config = self.config.clone();
-        config.fusion.method = method;
         let start = Instant::now();
-        let fusion = pipeline::fuse(&config, &self.ground, &Silent);
-        let seconds = start.elapsed().as_secs_f64();
-        let scene = self.ground.scene(&config, &self.inputs);
-        // Scored as a run writes it.
-        let map = scene.rocks_geojson(&scene.rock_map(&fusion), "");
-        let map = map_from_bytes(&map.content, map.name)?;
+        let (map, seconds) = match contender {
+            Contender::Method(method) => self.fused(method)?,
+            Contender::Bound(bound) => {
+                let truth = &self.truth.objects;
+                let bounded = pipeline::bound(&self.config, &self.labels, truth, bound, &Silent)?;
+                (bounded.map, start.elapsed().as_secs_f64())
+            }
+        };
         let report = Report::new(&Comparison::new(&map, &self.truth, scoring)?);
         Ok(Scores {
             n_truths: report.counts.n_truths_counted,
@@ -214,5 +216,17 @@ impl Run {
             coverage_95: report.consistency.coverage_95,
             seconds,
         })
+    }
+
+    /// The map of a method, as a run writes it, and the time that fusing took, seconds.
+    fn fused(&self, method: Method) -> Result<(RockMap, f64), Error> {
+        let mut config = self.config.clone();
+        config.fusion.method = method;
+        let start = Instant::now();
+        let fusion = pipeline::fuse(&config, &self.ground, &Silent);
+        let seconds = start.elapsed().as_secs_f64();
+        let scene = self.ground.scene(&config, &self.inputs);
+        let map = scene.rocks_geojson(&scene.rock_map(&fusion), "");
+        Ok((map_from_bytes(&map.content, map.name)?, seconds))
     }
 }
