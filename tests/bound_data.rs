@@ -67,7 +67,7 @@ fn is_clairvoyant(set: &str, pipeline: &str, n: usize, worst_m: f64) {
 }
 
 /// Landmarks by range and bearing, hundreds of views of a dozen objects. With identities known and
-/// poses left as they are the Python numpy reference comes to 0.065, 0.070 and 0.031 m.
+/// poses left as they are the numpy reference comes to 0.065, 0.070 and 0.031 m.
 #[test]
 fn landmarks_of_mrclam() {
     is_clairvoyant("mrclam-1", "mrclam.toml", 11, 0.06);

@@ -1,4 +1,4 @@
-//! The bounds against those of the Python numpy reference on the same data: tests/reference/bounds.py
+//! The bounds against those of the numpy reference on the same data: tests/reference/bounds.py
 //! wrote the scenes and the results under tests/data/bounds.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -197,7 +197,7 @@ fn index(objects: &[i64], id: i64) -> usize {
 }
 
 #[test]
-fn clairvoyant_on_a_plane_agrees_with_the_numpy reference() {
+fn clairvoyant_on_a_plane_agrees_with_the_numpy_reference() {
     let scene = scene("small.json");
     let (views, measurements) = (scene.views(), scene.measurements());
     let plane = LevelPlane::default();
@@ -256,7 +256,7 @@ fn fair_map(scene: &Scene, height_sigma_m: f64) -> BoundMap {
 }
 
 #[test]
-fn fair_on_a_plane_agrees_with_the_numpy reference() {
+fn fair_on_a_plane_agrees_with_the_numpy_reference() {
     let scene = scene("small.json");
     let expected = &scene.fair;
     let map = fair_map(&scene, 0.0);
