@@ -1,30 +1,29 @@
 //! A TOML file whose every value knows its place, read section by section, all faults collected.
 
 use std::cell::RefCell;
-use std::fmt::Display;
-use std::ops::RangeBounds;
 
 use toml_edit::{Item, TableLike, Value};
 
-use crate::error::{Fault, Place, suggestion};
+use super::Section;
+use crate::error::{Fault, Place};
 
 /// A parsed TOML file, with the command line's overrides laid over it.
 #[derive(Debug)]
 pub struct Document {
-    file: String,
-    root: Node,
-    faults: RefCell<Vec<Fault>>,
+    pub(super) file: String,
+    pub(super) root: Node,
+    pub(super) faults: RefCell<Vec<Fault>>,
 }
 
 /// A value and where it stands.
 #[derive(Debug, Clone)]
-struct Node {
-    place: Place,
-    kind: Kind,
+pub(super) struct Node {
+    pub(super) place: Place,
+    pub(super) kind: Kind,
 }
 
 #[derive(Debug, Clone)]
-enum Kind {
+pub(super) enum Kind {
     Text(String),
     Number(f64),
     Boolean(bool),
@@ -108,12 +107,7 @@ impl Document {
 
     /// The whole file as a section.
     pub fn root(&self) -> Section<'_> {
-        Section {
-            document: self,
-            node: Some(&self.root),
-            path: String::new(),
-            known: RefCell::default(),
-        }
+        Section::root(self)
     }
 
     /// All faults found while reading, in the order of the file.
@@ -208,7 +202,7 @@ impl Node {
         }
     }
 
-    fn shown(&self) -> String {
+    pub(super) fn shown(&self) -> String {
         match &self.kind {
             Kind::Text(t) => format!("{t:?}"),
             Kind::Number(x) => x.to_string(),
@@ -216,237 +210,6 @@ impl Node {
             Kind::List(list) => format!("a list of {}", list.len()),
             Kind::Table(_) => "a table".to_owned(),
             Kind::Other(date) => date.clone(),
-        }
-    }
-}
-
-/// A table of the document. Every key it is asked for counts as known; [`Section::finish`] reports
-/// the others.
-pub struct Section<'a> {
-    document: &'a Document,
-    node: Option<&'a Node>,
-    path: String,
-    known: RefCell<Vec<String>>,
-}
-
-impl<'a> Section<'a> {
-    /// Whether the file has this section.
-    pub fn is_present(&self) -> bool {
-        self.node.is_some()
-    }
-
-    /// Whether the section has this key, which counts as known from then on.
-    pub fn has(&self, key: &str) -> bool {
-        self.get(key).is_some()
-    }
-
-    fn get(&self, key: &str) -> Option<&'a Node> {
-        self.known.borrow_mut().push(key.to_owned());
-        match &self.node?.kind {
-            Kind::Table(entries) => entries.iter().find(|(k, _)| k == key).map(|(_, n)| n),
-            _ => None,
-        }
-    }
-
-    /// The dotted path of a key.
-    fn path_of(&self, key: &str) -> String {
-        match (self.path.is_empty(), key.is_empty()) {
-            (true, _) => key.to_owned(),
-            (false, true) => self.path.clone(),
-            (false, false) => format!("{}.{key}", self.path),
-        }
-    }
-
-    /// Where a key stands, or where its section does, or the file.
-    pub fn place(&self, key: &str) -> Place {
-        let entry = match self.node.map(|n| &n.kind) {
-            Some(Kind::Table(entries)) => entries.iter().find(|(k, _)| k == key).map(|(_, n)| n),
-            _ => None,
-        };
-        entry
-            .or(self.node.filter(|n| n.place.line.is_some()))
-            .map_or_else(|| Place::file(&self.document.file), |n| n.place.clone())
-    }
-
-    /// Records a fault in a key.
-    pub fn fault(&self, key: &str, found: impl Display, expected: impl Display) {
-        let fault = Fault::found(self.place(key), self.path_of(key), found, expected);
-        self.document.faults.borrow_mut().push(fault);
-    }
-
-    /// Records a fault in a key, in words of the caller's.
-    pub fn problem(&self, key: &str, problem: impl Into<String>) {
-        let fault = Fault::new(self.place(key), self.path_of(key), problem);
-        self.document.faults.borrow_mut().push(fault);
-    }
-
-    fn take<T>(
-        &self,
-        key: &str,
-        expected: impl Display,
-        convert: impl FnOnce(&'a Node) -> Option<T>,
-    ) -> Option<T> {
-        let node = self.get(key)?;
-        let converted = convert(node);
-        if converted.is_none() {
-            self.fault(key, node.shown(), expected);
-        }
-        converted
-    }
-
-    /// Text.
-    pub fn text(&self, key: &str) -> Option<String> {
-        self.take(key, "text", |n| match &n.kind {
-            Kind::Text(t) => Some(t.clone()),
-            _ => None,
-        })
-    }
-
-    /// Text, or a list of texts.
-    pub fn texts(&self, key: &str) -> Option<Vec<String>> {
-        let text = |n: &Node| match &n.kind {
-            Kind::Text(t) => Some(t.clone()),
-            _ => None,
-        };
-        self.take(key, "text or a list of texts", |n| match &n.kind {
-            Kind::List(list) => list.iter().map(text).collect(),
-            _ => text(n).map(|t| vec![t]),
-        })
-    }
-
-    /// One of a few words.
-    pub fn word(&self, key: &str, words: &[&str]) -> Option<String> {
-        let expected = words.join(", ");
-        let near = match self.get(key).map(|n| &n.kind) {
-            Some(Kind::Text(t)) => suggestion(t, words.iter().copied()),
-            _ => None,
-        };
-        let near = near
-            .map(|w| format!(" (is {w} meant?)"))
-            .unwrap_or_default();
-        self.take(key, format!("one of {expected}{near}"), |n| match &n.kind {
-            Kind::Text(t) if words.contains(&t.as_str()) => Some(t.clone()),
-            _ => None,
-        })
-    }
-
-    /// True or false.
-    pub fn boolean(&self, key: &str) -> Option<bool> {
-        self.take(key, "true or false", |n| match n.kind {
-            Kind::Boolean(b) => Some(b),
-            _ => None,
-        })
-    }
-
-    /// A finite number within bounds, which `expected` words.
-    pub fn number(&self, key: &str, bounds: impl RangeBounds<f64>, expected: &str) -> Option<f64> {
-        self.take(key, expected, |n| match n.kind {
-            Kind::Number(x) if x.is_finite() && bounds.contains(&x) => Some(x),
-            _ => None,
-        })
-    }
-
-    /// A whole number within bounds.
-    pub fn integer(&self, key: &str, bounds: std::ops::RangeInclusive<u64>) -> Option<u64> {
-        let expected = format!("a whole number from {} to {}", bounds.start(), bounds.end());
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "checked to be whole and in range"
-        )]
-        self.take(key, expected, |n| match n.kind {
-            Kind::Number(x) if x.fract() == 0.0 && x >= 0.0 && bounds.contains(&(x as u64)) => {
-                Some(x as u64)
-            }
-            _ => None,
-        })
-    }
-
-    /// A list of finite numbers whose length is one of `lengths`.
-    pub fn numbers(&self, key: &str, lengths: &[usize]) -> Option<Vec<f64>> {
-        let counts: Vec<String> = lengths.iter().map(usize::to_string).collect();
-        let expected = format!("a list of {} finite numbers", counts.join(" or "));
-        self.take(key, expected, |n| match &n.kind {
-            Kind::List(list) if lengths.contains(&list.len()) => list
-                .iter()
-                .map(|n| match n.kind {
-                    Kind::Number(x) if x.is_finite() => Some(x),
-                    _ => None,
-                })
-                .collect(),
-            _ => None,
-        })
-    }
-
-    /// A list of any number of finite numbers.
-    pub fn number_list(&self, key: &str) -> Option<Vec<f64>> {
-        self.take(key, "a list of finite numbers", |n| match &n.kind {
-            Kind::List(list) => list
-                .iter()
-                .map(|n| match n.kind {
-                    Kind::Number(x) if x.is_finite() => Some(x),
-                    _ => None,
-                })
-                .collect(),
-            _ => None,
-        })
-    }
-
-    /// Three finite numbers.
-    pub fn triple(&self, key: &str) -> Option<[f64; 3]> {
-        self.numbers(key, &[3])?.try_into().ok()
-    }
-
-    /// A section below this one; an absent one answers `None` to every key.
-    pub fn section(&self, key: &str) -> Section<'a> {
-        let node = self.take(key, "a table", |n| {
-            matches!(n.kind, Kind::Table(_)).then_some(n)
-        });
-        Section {
-            document: self.document,
-            node,
-            path: self.path_of(key),
-            known: RefCell::default(),
-        }
-    }
-
-    /// All sections below this one, with their names, in the order of the file.
-    pub fn sections(&self) -> Vec<(String, Section<'a>)> {
-        match self.node.map(|n| &n.kind) {
-            Some(Kind::Table(entries)) => entries
-                .iter()
-                .map(|(key, _)| (key.clone(), self.section(key)))
-                .collect(),
-            _ => Vec::new(),
-        }
-    }
-
-    /// A number within bounds, or one of a few words: `Ok` the one, `Err` the other.
-    pub fn number_or_word(
-        &self,
-        key: &str,
-        words: &[&str],
-        bounds: impl RangeBounds<f64>,
-        number: &str,
-    ) -> Option<Result<f64, String>> {
-        if let Some(Kind::Number(_)) = self.get(key).map(|n| &n.kind) {
-            let expected = format!("{}, or {number}", words.join(", "));
-            return self.number(key, bounds, &expected).map(Ok);
-        }
-        self.word(key, words).map(Err)
-    }
-
-    /// Records a fault for every key that was never asked for, with the nearest known one.
-    pub fn finish(self) {
-        let Some(Kind::Table(entries)) = self.node.map(|n| &n.kind) else {
-            return;
-        };
-        let known = self.known.borrow();
-        for (key, _) in entries.iter().filter(|(key, _)| !known.contains(key)) {
-            let near = suggestion(key, known.iter().map(String::as_str))
-                .map(|near| format!(", is {near} meant?"))
-                .unwrap_or_default();
-            self.problem(key, format!("unknown key{near}"));
         }
     }
 }

@@ -6,9 +6,11 @@
 mod document;
 mod reject;
 mod rows;
+mod section;
 mod table;
 
-pub use document::{Document, Section};
+pub use document::Document;
 pub use reject::{Reason, Reject};
 pub use rows::write_rows;
+pub use section::Section;
 pub use table::{Row, Table};
