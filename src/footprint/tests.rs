@@ -257,3 +257,41 @@ fn seams_between_triangles_leave_no_gap() {
         }
     }
 }
+
+#[test]
+fn no_attitude_loses_its_footprint() {
+    let camera = || Some(pinhole());
+    for pitch in [-20, -10, 0, 5, 10, 15, 30, 60, 90] {
+        for roll in [-30, -1, 0, 2, 45] {
+            for yaw in [0, 1, 45, 90, 137, 180, 270] {
+                let [r, p, y] = [roll, pitch, yaw].map(|a| f64::from(a).to_radians());
+                let turn = UnitQuaternion::from_euler_angles(r, p, y);
+                let view = view(camera(), 2.0, Rotation::from_unit_quaternion(turn));
+                let footprint = trace(&view, Some(&ground()), reach(0.0, 20.0));
+                let expected = sampled_area_m2(&view, 20.0);
+                let found = footprint.area_m2();
+                let at = format!("roll {roll}, pitch {pitch}, yaw {yaw}");
+                assert!(
+                    (found - expected).abs() < 0.02 * expected + 0.5,
+                    "{at}: {found} {expected}"
+                );
+            }
+        }
+    }
+}
+
+/// The ground a view sees, counted on a grid of a quarter of a metre.
+fn sampled_area_m2(view: &View, reach_m: f64) -> f64 {
+    let camera_from_enu = view.enu_from_camera().unwrap().inverse();
+    let camera = view.camera.as_ref().unwrap();
+    let mut count = 0;
+    for i in -80..80 {
+        for j in -80..80 {
+            let (x, y) = (f64::from(i) * 0.25 + 0.125, f64::from(j) * 0.25 + 0.125);
+            let seen = camera.pixel(camera_from_enu * Point::new(x, y, 0.0));
+            let inside = seen.is_ok_and(|p| p.is_inside(camera.width, camera.height));
+            count += i32::from(inside && x.hypot(y) <= reach_m);
+        }
+    }
+    f64::from(count) * 0.0625
+}

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use geo::{BooleanOps, Coord, LineString, MultiPolygon, Polygon, unary_union};
+use geo::algorithm::bool_ops::FillRule;
+use geo::{BooleanOps, Coord, LineString, MultiPolygon, Polygon};
 use nalgebra::Vector3;
 
 use super::clip::{disc, sector, to_ranges};
@@ -74,8 +75,10 @@ impl Eye<'_> {
         let to_ground = |pixel: Pixel| self.landing(pixel);
         let ring = border::walk(self.camera, &to_ground, &tolerance_m)?;
         let traced = Polygon::new(LineString::new(ring), Vec::new());
-        // A union with nothing resolves the crossings that steps of the terrain may cause.
-        let enclosed = unary_union([&traced]);
+        // A union with nothing resolves the crossings that the rim and steps of the terrain cause:
+        // whatever the trace winds around counts, in whichever sense.
+        let nothing = MultiPolygon::new(Vec::new());
+        let enclosed = MultiPolygon::from(traced).union_with_fill_rule(&nothing, FillRule::NonZero);
         let up = Point::from_xyz(origin.xyz + Vector3::z());
         if self.shows(up) {
             return Some(MultiPolygon::from(disc(origin, self.limit_m)).difference(&enclosed));

@@ -156,7 +156,7 @@ impl<'a> Map<'a> {
             }
         };
         annotate(&mut picture, &self.scene.annotation_of(index, &self.rocks));
-        let path = folder.path_of(&Path::new("annotated").join(tame(&source.name)))?;
+        let path = folder.path_of(&Path::new("annotated").join(drawn_name(&source.name)))?;
         picture.write(&path, Picture::JPEG_QUALITY)?;
         Ok(true)
     }
@@ -193,6 +193,16 @@ impl<'a> Map<'a> {
         summary.run_id = Some(self.run_id);
         summary.folder = Some(folder.publish()?);
         Ok(summary)
+    }
+}
+
+/// What an annotated picture is called: as its original, but for TIFF, which becomes PNG.
+fn drawn_name(name: &str) -> PathBuf {
+    let path = tame(name);
+    let extension = path.extension().map(|e| e.to_ascii_lowercase());
+    match extension.as_ref().and_then(|e| e.to_str()) {
+        Some("jpg" | "jpeg" | "png") => path,
+        _ => path.with_extension("png"),
     }
 }
 

@@ -113,7 +113,9 @@ impl Scene<'_> {
         let mut layer = Layer::new("views", self.site.planet());
         for view in self.views {
             let place = self.site.geodetic(view.origin());
-            let yaw_deg = view.yaw().map(|yaw| yaw.to_degrees().rem_euclid(360.0));
+            // Rounded first: what rounds up to a full turn is north.
+            let rounded = |yaw: f64| (yaw.to_degrees() * 1e4).round() / 1e4;
+            let yaw_deg = view.yaw().map(|yaw| rounded(yaw).rem_euclid(360.0));
             let properties = json!({
                 "image_id": view.image_id,
                 "camera": view.camera_name(),
