@@ -2,9 +2,8 @@
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Vector3};
 
-use super::perspective::{direction_of_plane, plane_of_point, product};
 use super::sensor::Sensor;
-use super::{BadLens, LensError, Mount, central_ray};
+use super::{BadLens, LensError, Mount};
 use crate::frame::{self, Pixel, Point, Ray, RigidTransform, Rotation, Vector};
 
 /// The body axes that the vectors of a CAHV model are written in.
@@ -143,9 +142,7 @@ impl Cahv {
         &self,
         pixel: Pixel,
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
-        let (plane, plane_by_pixel) = self.sensor.plane(pixel)?;
-        let (direction, by_plane) = direction_of_plane(plane);
-        Ok((central_ray(direction), product(&by_plane, &plane_by_pixel)))
+        self.sensor.perspective_ray(pixel)
     }
 
     #[inline]
@@ -153,9 +150,7 @@ impl Cahv {
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
-        let (plane, by_point) = plane_of_point(point.xyz)?;
-        let (pixel, by_plane) = self.sensor.pixel(plane)?;
-        Ok((pixel, product(&by_plane, &by_point)))
+        self.sensor.perspective_pixel(point)
     }
 }
 

@@ -2,9 +2,8 @@
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2};
 
-use super::perspective::{direction_of_plane, plane_of_point, product};
 use super::sensor::Sensor;
-use super::{BadLens, LensError, central_ray};
+use super::{BadLens, LensError};
 use crate::frame::{self, Pixel, Point, Ray};
 
 /// Focal lengths and principal point, pixels.
@@ -66,9 +65,7 @@ impl Pinhole {
         &self,
         pixel: Pixel,
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
-        let (plane, plane_by_pixel) = self.sensor.plane(pixel)?;
-        let (direction, by_plane) = direction_of_plane(plane);
-        Ok((central_ray(direction), product(&by_plane, &plane_by_pixel)))
+        self.sensor.perspective_ray(pixel)
     }
 
     #[inline]
@@ -76,8 +73,6 @@ impl Pinhole {
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
-        let (plane, by_point) = plane_of_point(point.xyz)?;
-        let (pixel, by_plane) = self.sensor.pixel(plane)?;
-        Ok((pixel, product(&by_plane, &by_point)))
+        self.sensor.perspective_pixel(point)
     }
 }

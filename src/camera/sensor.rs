@@ -1,10 +1,10 @@
 //! The projective map between the distorted image plane and the pixels.
 
-use nalgebra::{Matrix2, Matrix3, Vector2};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2};
 
-use super::LensError;
-use super::perspective::product;
-use crate::frame::Pixel;
+use super::perspective::{direction_of_plane, plane_of_point, product};
+use super::{LensError, central_ray};
+use crate::frame::{self, Pixel, Point, Ray};
 
 /// A homography from the distorted image plane at unit depth to pixels: a camera matrix, one behind
 /// a tilted sensor, or the three vectors H, V, A of a CAHV model.
@@ -69,4 +69,29 @@ fn transfer(matrix: &Matrix3<f64>, place: Vector2<f64>) -> Option<(Vector2<f64>,
         );
         (image, slope)
     })
+}
+
+/// The two ways through a lens without distortion.
+impl Sensor {
+    /// The ray of a pixel, with the derivative of its direction.
+    #[inline]
+    pub(super) fn perspective_ray(
+        &self,
+        pixel: Pixel,
+    ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
+        let (plane, plane_by_pixel) = self.plane(pixel)?;
+        let (direction, by_plane) = direction_of_plane(plane);
+        Ok((central_ray(direction), product(&by_plane, &plane_by_pixel)))
+    }
+
+    /// The pixel of a point, with its derivative.
+    #[inline]
+    pub(super) fn perspective_pixel(
+        &self,
+        point: Point<frame::Camera>,
+    ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
+        let (plane, by_point) = plane_of_point(point.xyz)?;
+        let (pixel, by_plane) = self.pixel(plane)?;
+        Ok((pixel, product(&by_plane, &by_point)))
+    }
 }

@@ -66,31 +66,7 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
     let cameras = all_cameras(cameras, &mut faults);
     faults.none()?;
 
-    let mut files = Vec::new();
-    let kinds = [
-        (
-            "poses",
-            &input.poses,
-            Some(poses.iter().map(|p| p.2.n_rows()).collect::<Vec<_>>()),
-        ),
-        (
-            "images",
-            &input.images,
-            Some(images.iter().map(|p| p.2.n_rows()).collect()),
-        ),
-        ("cameras", &input.cameras, None),
-        (
-            "detections",
-            &input.detections,
-            Some(detections.iter().map(|p| p.2.n_rows()).collect()),
-        ),
-        ("terrain", &config.terrain.path, None),
-    ];
-    for (kind, sources, rows) in kinds {
-        for (i, source) in sources.iter().enumerate() {
-            files.push(digest(kind, source, rows.as_ref().map(|r| r[i]))?);
-        }
-    }
+    let files = input_files(config, &poses, &images, &detections)?;
     let mut assembly = view::assemble(&Sources {
         poses: &poses,
         images: &images,
@@ -121,6 +97,42 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
         inputs.detections.len()
     ));
     Ok(inputs)
+}
+
+/// All files of a run with their digests, the tables among them with their rows.
+fn input_files(
+    config: &Config,
+    poses: &[Read<PoseFile>],
+    images: &[Read<ImageFile>],
+    detections: &[Read<DetectionFile>],
+) -> Result<Vec<InputFile>, Error> {
+    let input = &config.input;
+    let mut files = Vec::new();
+    let kinds = [
+        (
+            "poses",
+            &input.poses,
+            Some(poses.iter().map(|p| p.2.n_rows()).collect::<Vec<_>>()),
+        ),
+        (
+            "images",
+            &input.images,
+            Some(images.iter().map(|p| p.2.n_rows()).collect()),
+        ),
+        ("cameras", &input.cameras, None),
+        (
+            "detections",
+            &input.detections,
+            Some(detections.iter().map(|p| p.2.n_rows()).collect()),
+        ),
+        ("terrain", &config.terrain.path, None),
+    ];
+    for (kind, sources, rows) in kinds {
+        for (i, source) in sources.iter().enumerate() {
+            files.push(digest(kind, source, rows.as_ref().map(|r| r[i]))?);
+        }
+    }
+    Ok(files)
 }
 
 /// Faults of all inputs, so that they are told together.
