@@ -458,3 +458,26 @@ c,,2,0,10,0,-90,0
         ]
     );
 }
+
+#[test]
+fn a_second_pose_of_an_image_and_a_pose_off_the_site() {
+    let poses = POSES.to_owned() + "a,5,0,10,0,-90,0\n";
+    let case = Case::new().with("poses.csv", &poses.replace("c,2,", "c,200000,"));
+    let expected = [
+        "poses.csv,4,c,off_site,\"found a pose 200.0 km from the site's origin, expected at most 100 km\"",
+        "poses.csv,5,a,duplicate,\"found this image_id a second time, expected it once\"",
+        "detections.csv,4,c/0,image_rejected,\"image_id: image c was itself rejected, off_site\"",
+    ];
+    rejected(&case, &expected);
+    // The same where an image list says which images there are: but for the image without a pose.
+    let case = case.with("images.csv", "image_id\na\nb\n");
+    let set = [
+        "--force",
+        "--set",
+        "input.images=images.csv",
+        "--set",
+        "input.max_reject_share=1",
+    ];
+    assert_eq!(case.run(&set), (Vec::new(), 0));
+    assert_eq!(case.rejects(), expected);
+}

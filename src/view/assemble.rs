@@ -1,6 +1,6 @@
 //! Poses, image list and cameras put together into views.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -40,20 +40,20 @@ pub struct Assembly {
 /// Puts views together.
 pub fn assemble(sources: &Sources<'_>) -> Assembly {
     let mut assembly = Assembly::default();
-    let located = locate(sources, &mut assembly.rejects);
+    let located = locate(sources, &mut assembly);
     let is_log = sources.poses.iter().any(|(_, _, file)| !file.is_per_image);
     let rows = if is_log {
         from_log(sources, &located, &mut assembly)
     } else {
         per_image(sources, &located, &mut assembly)
     };
-    let mut seen = HashMap::new();
+    let mut seen = HashSet::new();
     for row in rows {
         let view = view(sources, &row);
         match view {
-            Ok(_) if seen.insert(row.image.image_id.clone(), ()).is_some() => {
-                let expected = "found this image_id a second time, expected it once";
-                row.reject(Reason::Duplicate, expected.to_owned(), &mut assembly);
+            Ok(_) if !seen.insert(row.image.image_id.clone()) => {
+                let detail = "found this image_id a second time, expected it once";
+                row.reject(Reason::Duplicate, detail.to_owned(), &mut assembly);
             }
             Ok(view) => assembly.views.push(view),
             Err((reason, detail)) => row.reject(reason, detail, &mut assembly),
@@ -62,7 +62,7 @@ pub fn assemble(sources: &Sources<'_>) -> Assembly {
     if assembly.views.iter().all(|v| v.time.is_some()) {
         assembly.views.sort_by_key(|v| v.time);
     }
-    for image in seen.keys() {
+    for image in &seen {
         assembly.rejected_images.remove(image);
     }
     assembly
@@ -112,14 +112,18 @@ fn set_aside(
 }
 
 /// All pose rows that lie on the site.
-fn locate<'a>(sources: &Sources<'a>, rejects: &mut Vec<Reject>) -> Vec<Located<'a>> {
+fn locate<'a>(sources: &Sources<'a>, assembly: &mut Assembly) -> Vec<Located<'a>> {
     let mut located = Vec::new();
     for (path, shown, file) in sources.poses {
         for row in &file.rows {
             let pose = row.resolve(sources.site, sources.pose_sigma);
             let away_m = pose.enu_from_body.origin().distance(Point::origin());
             if away_m > Site::REACH_M {
-                rejects.push(Reject {
+                if let PoseKey::Image { image_id, .. } = &row.key {
+                    let reasons = &mut assembly.rejected_images;
+                    reasons.entry(image_id.clone()).or_insert(Reason::OffSite);
+                }
+                assembly.rejects.push(Reject {
                     file: shown.clone(),
                     line: Some(row.line),
                     record: record_of(&row.key),
@@ -202,7 +206,7 @@ fn pose_of(
 /// One track a platform; second samples at one time are set aside.
 fn tracks(located: &[Located<'_>], rejects: &mut Vec<Reject>) -> BTreeMap<Option<String>, Track> {
     let mut samples: BTreeMap<Option<String>, Vec<(Time, Pose)>> = BTreeMap::new();
-    let mut seen: HashMap<(Option<&str>, Time), ()> = HashMap::new();
+    let mut seen: HashSet<(Option<&str>, Time)> = HashSet::new();
     for Located {
         shown, row, pose, ..
     } in located
@@ -210,7 +214,7 @@ fn tracks(located: &[Located<'_>], rejects: &mut Vec<Reject>) -> BTreeMap<Option
         let PoseKey::Time(time) = row.key else {
             continue;
         };
-        if seen.insert((row.platform.as_deref(), time), ()).is_some() {
+        if !seen.insert((row.platform.as_deref(), time)) {
             rejects.push(Reject {
                 file: (*shown).to_owned(),
                 line: Some(row.line),
@@ -248,9 +252,20 @@ fn per_image<'a>(
         });
         return rows.collect();
     }
-    let mut poses = HashMap::new();
+    let mut poses: HashMap<String, &Located<'a>> = HashMap::new();
     for l in located {
-        poses.entry(record_of(&l.row.key)).or_insert(l);
+        let image = record_of(&l.row.key);
+        if poses.contains_key(&image) {
+            assembly.rejects.push(Reject {
+                file: l.shown.to_owned(),
+                line: Some(l.row.line),
+                record: image,
+                reason: Reason::Duplicate,
+                detail: "found this image_id a second time, expected it once".to_owned(),
+            });
+            continue;
+        }
+        poses.insert(image, l);
     }
     let mut posed = Vec::new();
     for (path, shown, file) in sources.images {
