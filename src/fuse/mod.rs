@@ -25,11 +25,13 @@
 //! ```
 
 mod assignment;
+mod exclusive;
 mod gate;
 mod merge;
 mod mixture;
 
 pub use assignment::Weights;
+pub use exclusive::{Exclusive, Settled};
 pub use mixture::{MixtureSettings, Start, fuse_mixture};
 
 use nalgebra::Matrix3;
