@@ -87,7 +87,13 @@ impl Exclusive {
         assert_eq!(pairs.len(), odds.len(), "odds are given by pair");
         self.graph.build(n_detections, n_objects, pairs);
         self.odds.clear();
-        let cut = |&at: &usize| odds[at].max(0.0).min(MOST_ODDS);
+        let cut = |&at: &usize| {
+            if odds[at] > 0.0 {
+                odds[at].min(MOST_ODDS)
+            } else {
+                0.0
+            }
+        };
         self.odds.extend(self.graph.pair_of.iter().map(cut));
         for (messages, neutral) in [
             (&mut self.to_object, 1.0),
