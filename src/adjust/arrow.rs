@@ -7,22 +7,22 @@ use super::envelope::{Envelope, Factor};
 
 /// `[[K, B^T], [B, E]] [x; y] = [k; e]` with K and E block diagonal.
 #[derive(Debug)]
-pub(super) struct Arrow<const A: usize, const B: usize> {
+pub(crate) struct Arrow<const A: usize, const B: usize> {
     /// Blocks of the kept unknowns, and their right-hand sides.
-    pub(super) kept: Vec<(SMatrix<f64, A, A>, SVector<f64, A>)>,
+    pub(crate) kept: Vec<(SMatrix<f64, A, A>, SVector<f64, A>)>,
     /// Blocks of the unknowns to eliminate, and their right-hand sides.
-    pub(super) eliminated: Vec<(SMatrix<f64, B, B>, SVector<f64, B>)>,
+    pub(crate) eliminated: Vec<(SMatrix<f64, B, B>, SVector<f64, B>)>,
     /// Couplings: of an eliminated with a kept unknown, sorted by the former.
-    pub(super) couplings: Vec<(usize, usize, SMatrix<f64, B, A>)>,
+    pub(crate) couplings: Vec<(usize, usize, SMatrix<f64, B, A>)>,
 }
 
 /// A solved system.
 #[derive(Debug)]
-pub(super) struct Solved<const A: usize, const B: usize> {
+pub(crate) struct Solved<const A: usize, const B: usize> {
     /// The kept unknowns.
-    pub(super) kept: Vec<SVector<f64, A>>,
+    pub(crate) kept: Vec<SVector<f64, A>>,
     /// The eliminated ones.
-    pub(super) eliminated: Vec<SVector<f64, B>>,
+    pub(crate) eliminated: Vec<SVector<f64, B>>,
     factor: Factor,
     inverses: Vec<SMatrix<f64, B, B>>,
     couplings: Vec<(usize, usize, SMatrix<f64, B, A>)>,
@@ -31,7 +31,7 @@ pub(super) struct Solved<const A: usize, const B: usize> {
 impl<const A: usize, const B: usize> Arrow<A, B> {
     /// Solves by the Schur complement `K - B^T E^-1 B`; `None` where the system is not positive
     /// definite.
-    pub(super) fn solve(self) -> Option<Solved<A, B>> {
+    pub(crate) fn solve(self) -> Option<Solved<A, B>> {
         let inverses: Vec<SMatrix<f64, B, B>> = self
             .eliminated
             .iter()
@@ -96,7 +96,7 @@ impl<const A: usize, const B: usize> Arrow<A, B> {
 impl<const A: usize, const B: usize> Solved<A, B> {
     /// The diagonal blocks of the system's inverse: marginal covariances of the kept and of the
     /// eliminated unknowns.
-    pub(super) fn covariances(&self) -> (Vec<SMatrix<f64, A, A>>, Vec<SMatrix<f64, B, B>>) {
+    pub(crate) fn covariances(&self) -> (Vec<SMatrix<f64, A, A>>, Vec<SMatrix<f64, B, B>>) {
         let inverse = self.factor.selected_inverse();
         let block = |a: usize, b: usize| {
             SMatrix::<f64, A, A>::from_fn(|r, c| inverse.at(A * a + r, A * b + c))

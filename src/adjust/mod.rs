@@ -14,7 +14,7 @@
 //! complement and a sparse Cholesky factor of the rest. Where the height of the ground is known
 //! exactly (`sigma_z` = 0) heights stay zero and objects have two unknowns.
 
-mod arrow;
+pub(crate) mod arrow;
 mod envelope;
 mod joint;
 mod predict;
@@ -22,6 +22,7 @@ mod problem;
 mod surface;
 
 pub use joint::{Adjustment, Conditional, Edge, Marginals, NoSolution, Noise, State, Step};
+pub(crate) use predict::right_jacobian;
 pub use predict::{CorrectedPose, Prediction, Sight};
 pub use problem::{Measurement, Problem, Reading};
-pub use surface::{LevelPlane, Surface};
+pub use surface::{LevelPlane, PlatformLevel, Surface};

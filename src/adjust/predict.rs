@@ -277,7 +277,7 @@ fn scale(camera: &Camera, point: Vector3<f64>, by_camera: &nalgebra::Matrix2x3<f
 }
 
 /// `J(r)` with `Exp(r + dr) = Exp(r) Exp(J dr)` to first order (Chirikjian 2012, eq. 10.86).
-fn right_jacobian(r: Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn right_jacobian(r: Vector3<f64>) -> Matrix3<f64> {
     let angle = r.norm();
     let k = skew(r);
     let (first, second) = if angle < 1e-4 {

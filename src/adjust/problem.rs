@@ -58,6 +58,14 @@ pub struct Measurement {
     pub reading: Reading,
     /// Natural logarithm of the apparent width in pixels, where the mark shows a whole object.
     pub log_size: Option<f64>,
+    /// Width and height of the mark's box, pixels, where it has one.
+    pub box_px: Option<Vector2<f64>>,
+    /// Whether the picture's border cuts it.
+    pub is_cut: bool,
+    /// What it is; only measurements of one class are of one object.
+    pub class: usize,
+    /// The detector's score, 0 to 1.
+    pub score: Option<f64>,
 }
 
 /// What a detector read off a picture or a scan, with its standard deviations.
@@ -148,7 +156,24 @@ impl Measurement {
             view: index,
             reading,
             log_size: log_size(detection, view),
+            box_px: match detection.mark {
+                Mark::Box(b) => Some(Vector2::new(b.width(), b.height())),
+                _ => None,
+            },
+            is_cut: is_cut(detection, view),
+            class: 0,
+            score: detection.score,
         })
+    }
+}
+
+/// Boxes nearer than this to the picture's border are taken for cut by it, pixels.
+const BORDER_PX: f64 = 3.0;
+
+fn is_cut(detection: &Detection, view: &View) -> bool {
+    match (detection.mark, view.camera.as_deref()) {
+        (Mark::Box(b), Some(camera)) => !b.is_whole(camera.width, camera.height, BORDER_PX),
+        _ => false,
     }
 }
 

@@ -1,9 +1,11 @@
 //! The ground as the adjustment needs it.
 
 use nalgebra::{Matrix3, Vector3};
+use rstar::primitives::GeomWithData;
 
 use crate::frame::{Direction, Enu, Point, Ray};
 use crate::terrain::{Ground, Terrain};
+use crate::view::View;
 
 /// Ground that objects lie on, or near.
 pub trait Surface: Sync {
@@ -36,6 +38,41 @@ impl Surface for Terrain {
     fn first_hit(&self, ray: Ray<Enu>, max_ground_range_m: f64) -> Option<Point<Enu>> {
         let hit = Terrain::first_hit(self, ray, max_ground_range_m).ok()?;
         Some(hit.point)
+    }
+}
+
+/// Ground as high as the platforms that stand on it: where nothing is known of the terrain, objects
+/// are taken to lie level with the nearest view.
+#[derive(Debug, Clone)]
+pub struct PlatformLevel {
+    views: rstar::RTree<GeomWithData<[f64; 2], f64>>,
+}
+
+impl PlatformLevel {
+    /// Level with where each view looks from.
+    pub fn new(views: &[View]) -> Self {
+        let places = views.iter().map(|view| {
+            let at = view.origin().xyz;
+            GeomWithData::new([at.x, at.y], at.z)
+        });
+        Self {
+            views: rstar::RTree::bulk_load(places.collect()),
+        }
+    }
+}
+
+impl Surface for PlatformLevel {
+    fn ground_at(&self, east_m: f64, north_m: f64) -> Option<Ground> {
+        let nearest = self.views.nearest_neighbor(&[east_m, north_m])?;
+        Some(Ground {
+            point: Point::new(east_m, north_m, nearest.data),
+            normal: Direction::new(Vector3::z())?,
+        })
+    }
+
+    /// Rays that rise or sink meet no ground that is only known to be level.
+    fn first_hit(&self, _ray: Ray<Enu>, _max_ground_range_m: f64) -> Option<Point<Enu>> {
+        None
     }
 }
 

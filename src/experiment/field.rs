@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::evaluate::{self, Comparison, EstimateOutcome, Truth, TruthOutcome};
 use crate::frame::{Enu, Point};
 use crate::fuse::Fusion;
-use crate::pipeline::{self, Config, Ground, Inputs, Method, Overrides, Silent};
+use crate::pipeline::{self, Clock, Config, Ground, Inputs, Mapped, Method, Overrides, Silent};
 use crate::publish::{Annotation, Picture, Rock, Scene, annotate};
 use crate::simulate::{self, Simulation};
 
@@ -87,8 +87,10 @@ impl Field {
         };
         let config = Config::read(&folder.join("pipeline.toml"), &overrides)?;
         let inputs = pipeline::read(&config, &Silent)?;
-        let ground = pipeline::place(&config, &inputs, &Silent);
-        let fused = pipeline::fuse(&config, &ground, &Silent);
+        let Mapped {
+            ground,
+            fusion: fused,
+        } = pipeline::map(&config, &inputs, &mut Clock::start(), &Silent)?;
         Ok(Self {
             simulation,
             config,

@@ -81,7 +81,11 @@ pub fn fuse_mixture(
         objects.extend(mixture.objects(observations, settings));
     }
     objects.sort_by_key(|o| (o.members.first().map(|m| m.observation), o.class));
-    Fusion { objects, solver }
+    Fusion {
+        objects,
+        solver,
+        belief: None,
+    }
 }
 
 /// The clusters of one class while they settle.
@@ -268,6 +272,7 @@ impl Mixture {
             covariance,
             class: self.class,
             weight: self.weights[k],
+            size_m: None,
             p_exist: None,
             members,
         }

@@ -25,6 +25,7 @@
 //! ```
 
 mod assignment;
+pub mod belief;
 mod exclusive;
 mod gate;
 mod merge;
@@ -79,6 +80,8 @@ pub struct Object {
     pub class: usize,
     /// How many observations it accounts for: the sum of its memberships.
     pub weight: f64,
+    /// Its size, metres, from methods that say.
+    pub size_m: Option<f64>,
     /// Probability that it is real, from methods that say.
     pub p_exist: Option<f64>,
     /// The observations that belong to it with probability 0.01 or more, in their order.
@@ -101,6 +104,8 @@ pub struct Fusion {
     pub objects: Vec<Object>,
     /// Evidence of the solver, one entry a class.
     pub solver: Vec<SolverEvidence>,
+    /// What belief fusion learnt.
+    pub belief: Option<Box<belief::BeliefEvidence>>,
 }
 
 /// How a solver fared.

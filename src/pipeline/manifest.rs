@@ -59,7 +59,7 @@ pub(super) fn run_json(
             "pictures_annotated": summary.n_annotated,
         },
         "warnings": summary.warnings,
-        "solver": fusion.map(|f| &f.solver),
+        "solver": fusion.map(solver),
     });
     pretty(&manifest)
 }
@@ -71,4 +71,12 @@ pub(super) fn timing_json(stages: &[Stage], threads: usize) -> String {
 
 fn pretty(value: &Value) -> String {
     format!("{value:#}\n")
+}
+
+/// How fusing went.
+fn solver(fusion: &Fusion) -> serde_json::Value {
+    match &fusion.belief {
+        Some(belief) => json!([belief]),
+        None => json!(fusion.solver),
+    }
 }

@@ -23,18 +23,17 @@ pub use config::{
 };
 pub use digest::InputFile;
 pub(crate) use digest::hexadecimal;
-pub use fuse::fuse;
+pub use fuse::{Mapped, map};
 pub use observer::{Observer, Silent};
 pub use paths::{DEFAULT_DATA, Source};
 pub use pictures::PictureDigest;
 pub(crate) use publish::may_replace;
 pub use read::{Inputs, read};
-pub use stages::{Ground, Settings};
+pub use stages::{Clock, Ground, Settings};
 pub use summary::{FileCount, Stage, Summary};
 
 use crate::error::Error;
 use crate::publish::Folder;
-use stages::Clock;
 
 /// The whole job: reads, projects, traces footprints, fuses and publishes.
 ///
@@ -46,21 +45,17 @@ pub fn run(config: &Config, force: bool, observer: &dyn Observer) -> Result<Summ
     let inputs = clock.stage("read", || read::read(config, observer))?;
     let run_id = manifest::run_id("run", config, &inputs);
     publish::may_replace(&folder, &run_id, force)?;
-    let placed = clock.stage("project", || Ok(stages::project(config, &inputs, observer)))?;
-    let ground = clock.stage("footprint", || {
-        Ok(stages::footprint(config, &inputs, placed, observer))
-    })?;
-    let fusion = clock.stage("fuse", || Ok(fuse::fuse(config, &ground, observer)))?;
+    let Mapped { ground, fusion } = fuse::map(config, &inputs, &mut clock, observer)?;
     let map = publish::Map::new(config, &inputs, &ground, &fusion, run_id);
     let written = clock.stage("publish", || map.write(&folder, observer))?;
     map.finish(folder, written, clock)
 }
 
 /// Puts the detections of a run on the ground and traces what its views could have seen: the stages
-/// between [`read()`] and [`fuse()`], in memory.
+/// between [`read()`] and fusing, in memory.
 pub fn place(config: &Config, inputs: &Inputs, observer: &dyn Observer) -> Ground {
     let placed = stages::project(config, inputs, observer);
-    stages::footprint(config, inputs, placed, observer)
+    stages::footprint(config, inputs, placed, None, observer)
 }
 
 /// The same up to the ground: every detection by itself, with footprints and rejects.
@@ -75,7 +70,7 @@ pub fn project(config: &Config, force: bool, observer: &dyn Observer) -> Result<
     publish::may_replace(&folder, &run_id, force)?;
     let placed = clock.stage("project", || Ok(stages::project(config, &inputs, observer)))?;
     let ground = clock.stage("footprint", || {
-        Ok(stages::footprint(config, &inputs, placed, observer))
+        Ok(stages::footprint(config, &inputs, placed, None, observer))
     })?;
     let map = publish::Map::single_view(config, &inputs, &ground, run_id);
     let written = clock.stage("publish", || map.write(&folder, observer))?;

@@ -13,6 +13,7 @@ use crate::footprint::{Footprints, Reach, trace};
 use crate::input::Reject;
 use crate::project::{self, MarkNoise, Placed};
 use crate::publish::Scene;
+use crate::view::View;
 
 /// How detections are read, as the projection takes it.
 pub type Settings = project::Settings;
@@ -27,6 +28,8 @@ pub struct Ground {
     pub footprints: Footprints,
     /// Names of the classes, sorted; no class first.
     pub classes: Vec<Option<String>>,
+    /// The views with their poses corrected, where the method corrects poses.
+    pub corrected: Option<Vec<View>>,
 }
 
 impl Ground {
@@ -35,7 +38,8 @@ impl Ground {
         Scene {
             site: &inputs.site,
             terrain: inputs.terrain.as_ref(),
-            views: &inputs.views,
+            views: self.corrected.as_deref().unwrap_or(&inputs.views),
+            measured: self.corrected.as_ref().map(|_| inputs.views.as_slice()),
             detections: &inputs.detections,
             placed: &self.placed,
             footprints: &self.footprints,
@@ -118,13 +122,14 @@ pub(super) fn footprint(
     config: &Config,
     inputs: &Inputs,
     (placed, misses): (Vec<Placed>, Vec<Reject>),
+    corrected: Option<Vec<View>>,
     observer: &dyn Observer,
 ) -> Ground {
-    observer.begin("footprint", Some(inputs.views.len()));
+    let views = corrected.as_deref().unwrap_or(&inputs.views);
+    observer.begin("footprint", Some(views.len()));
     let reach = config.reach();
     let sector = sector_reach(reach, inputs, &placed);
-    let footprints: Vec<_> = inputs
-        .views
+    let footprints: Vec<_> = views
         .par_iter()
         .map(|view| {
             let reach = if view.camera.is_some() { reach } else { sector };
@@ -150,6 +155,7 @@ pub(super) fn footprint(
         misses,
         footprints: Footprints::new(footprints),
         classes,
+        corrected,
     }
 }
 
@@ -171,15 +177,18 @@ fn sector_reach(reach: Reach, inputs: &Inputs, placed: &[Placed]) -> Reach {
 
 /// Times the stages. What it reads goes to timing.json and the closing table alone: nothing in a
 /// map depends on it.
-pub(super) struct Clock {
-    pub(super) stages: Vec<Stage>,
+pub struct Clock {
+    /// The stages so far.
+    pub stages: Vec<Stage>,
 }
 
 impl Clock {
-    pub(super) fn start() -> Self {
+    /// No stages yet.
+    pub fn start() -> Self {
         Self { stages: Vec::new() }
     }
 
+    /// Runs a stage and notes its time and memory.
     pub(super) fn stage<T>(
         &mut self,
         name: &'static str,

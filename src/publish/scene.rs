@@ -15,6 +15,8 @@ pub struct Scene<'a> {
     pub terrain: Option<&'a Terrain>,
     /// The views.
     pub views: &'a [View],
+    /// The views with their poses as measured, where those of `views` are corrected.
+    pub measured: Option<&'a [View]>,
     /// All their detections, by view, those without a place on the ground too.
     pub detections: &'a [(usize, Detection)],
     /// The detections with a place on the ground.

@@ -12,7 +12,7 @@ use super::table::BenchTable;
 use super::{BenchOptions, Contender};
 use crate::error::Error;
 use crate::evaluate::{self, Comparison, Report, RockMap, Truth, map_from_bytes, read_truth};
-use crate::pipeline::{self, Config, Ground, Inputs, Method, Overrides, Silent};
+use crate::pipeline::{self, Clock, Config, Inputs, Mapped, Method, Overrides, Silent};
 use crate::simulate::{self, Scene};
 
 /// Part of what names a result. It goes up whenever a change of the program changes scores without
@@ -156,7 +156,6 @@ fn hash(scene: &Scene, contender: Contender, options: &BenchOptions) -> String {
 struct Run {
     config: Config,
     inputs: Inputs,
-    ground: Ground,
     truth: Truth,
     labels: PathBuf,
 }
@@ -179,12 +178,10 @@ impl Run {
         };
         let config = Config::read(&folder.join("pipeline.toml"), &overrides)?;
         let inputs = pipeline::read(&config, &Silent)?;
-        let ground = pipeline::place(&config, &inputs, &Silent);
         let objects = read_truth(&folder.join("truth.csv"), "truth.csv")?;
         Ok(Self {
             config,
             inputs,
-            ground,
             truth: Truth {
                 objects,
                 ignored: Vec::new(),
@@ -222,10 +219,12 @@ impl Run {
     fn fused(&self, method: Method) -> Result<(RockMap, f64), Error> {
         let mut config = self.config.clone();
         config.fusion.method = method;
-        let start = Instant::now();
-        let fusion = pipeline::fuse(&config, &self.ground, &Silent);
-        let seconds = start.elapsed().as_secs_f64();
-        let scene = self.ground.scene(&config, &self.inputs);
+        let mut clock = Clock::start();
+        let Mapped { ground, fusion } =
+            pipeline::map(&config, &self.inputs, &mut clock, &Silent)?;
+        let fusing = clock.stages.iter().find(|s| s.stage == "fuse");
+        let seconds = fusing.map_or(0.0, |s| s.seconds);
+        let scene = ground.scene(&config, &self.inputs);
         let map = scene.rocks_geojson(&scene.rock_map(&fusion), "");
         Ok((map_from_bytes(&map.content, map.name)?, seconds))
     }

@@ -1,0 +1,497 @@
+//! The M-step: places of objects and errors of poses that agree best with weighted detections (3.4).
+
+use nalgebra::{SMatrix, Vector4, Vector6};
+use rayon::prelude::*;
+
+use super::algebra::{
+    ByPose, Factor4, Square4, Square6, add_object_information, from_matrix, inverse4, inverse6,
+    object_spread, pose_spread, to_matrix4,
+};
+use super::engine::{Edge, Engine};
+use super::looks::Repeats;
+use super::noise::{robust_weight, with_noise};
+use crate::adjust::arrow::{Arrow, Solved};
+
+/// Objects move by at most this share of the range of the nearest view that detected them ...
+const STEP_SHARE: f64 = 0.2;
+/// ... and by this at least and at most, metres.
+const STEP_M: (f64, f64) = (0.3, 5.0);
+/// Logarithms of sizes move by at most this.
+const STEP_SIZE: f64 = 0.5;
+
+/// Objects that are solved for together with views, or a part of them.
+pub(super) struct Part<'a> {
+    /// The objects, by their number in the edges.
+    pub(super) objects: &'a mut [[f64; 4]],
+    pub(super) edges: &'a [Edge],
+    /// How many looks each edge is worth.
+    pub(super) worth: &'a [f64],
+    /// Views whose poses move, ascending; others are held.
+    pub(super) moving: &'a [usize],
+    /// Information of looks that are no longer among the edges, and its product with the place.
+    pub(super) folded: Option<(&'a [Square4], &'a [[f64; 4]])>,
+}
+
+/// What a step came to.
+pub(super) struct Stepped {
+    /// Covariances of objects, the poses held.
+    pub(super) conditional: Vec<Square4>,
+    /// Covariances of objects and of the moving poses, all others free.
+    pub(super) marginal: Option<(Vec<Square4>, Vec<Square6>)>,
+    /// The longest move, metres, before it was shortened.
+    pub(super) move_m: f64,
+}
+
+/// How far residuals are trusted.
+#[derive(Clone, Copy)]
+pub(super) enum Robust {
+    /// As the contaminated normal says.
+    Contaminated,
+    /// By Geman and McClure, with this squared scale.
+    Scale(f64),
+}
+
+struct Row {
+    object: usize,
+    view: usize,
+    range_m: f64,
+    by_object: Square4,
+    by_pose: ByPose,
+    n: usize,
+    e: [f64; 4],
+    /// Weighted information of the rows.
+    information: Square4,
+}
+
+impl Engine<'_> {
+    /// One Gauss-Newton step, which moves the objects of the part and the poses of its views.
+    pub(super) fn step(&mut self, part: Part<'_>, robust: Robust, marginals: bool) -> Stepped {
+        let rows = self.rows(&part, robust);
+        let n = part.objects.len();
+        let mut information = Vec::with_capacity(n);
+        let mut pull = Vec::with_capacity(n);
+        for (k, x) in part.objects.iter().enumerate() {
+            let prior = self.prior(x);
+            let (mut a, mut b) = (prior.information, prior.pull);
+            if let Some((folded, toward)) = part.folded {
+                for i in 0..4 {
+                    b[i] += toward[k][i];
+                    for j in 0..4 {
+                        a[i][j] += folded[k][i][j];
+                        b[i] -= folded[k][i][j] * x[j];
+                    }
+                }
+            }
+            information.push(a);
+            pull.push(b);
+        }
+        let mut nearest_m = vec![f64::INFINITY; n];
+        for row in &rows {
+            let k = row.object;
+            nearest_m[k] = nearest_m[k].min(row.range_m);
+            add_object_information(&mut information[k], &row.by_object, &row.information, row.n, 1.0);
+            let toward = row.toward();
+            for (p, h) in pull[k].iter_mut().zip(row.object_pull(&toward)) {
+                *p += h;
+            }
+        }
+        let conditional: Vec<Square4> = information.iter().map(inverse_or_zero).collect();
+        let (steps, marginal) = if self.corrects_poses() {
+            self.joint(&part, &rows, &information, &pull, marginals)
+        } else {
+            let steps = conditional.iter().zip(&pull).map(|(c, b)| times(c, b));
+            (steps.collect(), marginals.then(|| (conditional.clone(), Vec::new())))
+        };
+        let mut move_m = 0.0f64;
+        for ((x, step), nearest_m) in part.objects.iter_mut().zip(&steps).zip(&nearest_m) {
+            let length = (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]).sqrt();
+            if !length.is_finite() {
+                continue;
+            }
+            move_m = move_m.max(length);
+            let limit_m = (STEP_SHARE * nearest_m).clamp(STEP_M.0, STEP_M.1);
+            let share = (limit_m / length.max(1e-12)).min(1.0);
+            for i in 0..3 {
+                x[i] += step[i] * share;
+            }
+            x[3] += (step[3] * share).clamp(-STEP_SIZE, STEP_SIZE);
+        }
+        Stepped {
+            conditional,
+            marginal,
+            move_m,
+        }
+    }
+
+    fn rows(&self, part: &Part<'_>, robust: Robust) -> Vec<Row> {
+        let corrects = self.corrects_poses();
+        let row = |(edge, worth): (&Edge, &f64)| {
+            let look = &self.looks[edge.look];
+            let seen = self.expect(look.view, &part.objects[edge.object])?;
+            let e = seen.residual(look);
+            let variances = &self.looseness[edge.look];
+            let (by_object, by_pose) = seen.of(look);
+            let trust = match robust {
+                Robust::Contaminated => robust_weight(&e, variances, look.n_rows()),
+                Robust::Scale(c2) => {
+                    let m2: f64 = (0..2).map(|r| e[r] * e[r] / variances[r]).sum::<f64>()
+                        + if look.is_bearing() { e[3] * e[3] / variances[3] } else { 0.0 };
+                    (c2 / (c2 + m2)).powi(2)
+                }
+            };
+            let weight = edge.weight * worth * trust;
+            let mut information = [[0.0; 4]; 4];
+            if corrects {
+                for r in 0..look.n {
+                    if look.has[r] {
+                        information[r][r] = weight / variances[r];
+                    }
+                }
+            } else {
+                let spread = pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
+                let factor = Factor4::new(&with_noise(&spread, variances, 1.0), look.n)?;
+                information = factor.inverse();
+                for (r, row) in information.iter_mut().enumerate() {
+                    for (c, value) in row.iter_mut().enumerate() {
+                        let counts = look.has[r] && look.has[c];
+                        *value *= if counts { weight } else { 0.0 };
+                    }
+                }
+            }
+            Some(Row {
+                object: edge.object,
+                view: look.view,
+                range_m: seen.range_m,
+                by_object,
+                by_pose,
+                n: look.n,
+                e,
+                information,
+            })
+        };
+        let pairs = part.edges.par_iter().zip(part.worth);
+        pairs.map(row).collect::<Vec<_>>().into_iter().flatten().collect()
+    }
+
+    /// Objects and poses together; the poses move here, the steps of the objects are returned.
+    #[expect(clippy::type_complexity, reason = "steps, and covariances where asked for")]
+    fn joint(
+        &mut self,
+        part: &Part<'_>,
+        rows: &[Row],
+        information: &[Square4],
+        pull: &[[f64; 4]],
+        marginals: bool,
+    ) -> (Vec<[f64; 4]>, Option<(Vec<Square4>, Vec<Square6>)>) {
+        let moving = part.moving;
+        let mut poses: Vec<(SMatrix<f64, 6, 6>, Vector6<f64>)> = moving
+            .iter()
+            .map(|&view| {
+                let prior = Vector6::from(self.pose_information(view));
+                let at = Vector6::from(self.delta[view]);
+                (SMatrix::from_diagonal(&prior), -prior.component_mul(&at))
+            })
+            .collect();
+        let mut couplings: Vec<(usize, usize, SMatrix<f64, 4, 6>)> = Vec::new();
+        for row in rows {
+            let Ok(p) = moving.binary_search(&row.view) else {
+                continue;
+            };
+            let toward = row.toward();
+            let (a, b) = &mut poses[p];
+            row.add_to_pose(a, b, &toward);
+            couplings.push((row.object, p, row.coupling()));
+        }
+        let objects: Vec<(SMatrix<f64, 4, 4>, Vector4<f64>)> = information
+            .iter()
+            .zip(pull)
+            .map(|(a, b)| (to_matrix4(a), Vector4::from(*b)))
+            .collect();
+        let solution = if 4 * objects.len() < 6 * poses.len() {
+            objects_kept(objects, poses, couplings, marginals)
+        } else {
+            poses_kept(objects, poses, couplings, marginals)
+        };
+        let Some((steps, turns, marginal)) = solution else {
+            let still = vec![[0.0; 4]; information.len()];
+            return (still, None);
+        };
+        for (&view, turn) in moving.iter().zip(&turns) {
+            let mut delta = self.delta[view];
+            for (d, t) in delta.iter_mut().zip(turn.iter()) {
+                *d += t;
+            }
+            self.set_delta(view, delta);
+        }
+        let marginal = marginal.map(|(objects, poses)| {
+            (
+                objects.iter().map(from_matrix).collect(),
+                poses.iter().map(from_matrix).collect(),
+            )
+        });
+        (steps.iter().map(|s| (*s).into()).collect(), marginal)
+    }
+
+    /// Covariances of objects as others would see them from these edges, the errors of each pose
+    /// independent: 3.4's C_k.
+    pub(super) fn apart_cov(&self, part: &Part<'_>) -> Vec<Square4> {
+        let mut information: Vec<Square4> = part
+            .objects
+            .iter()
+            .enumerate()
+            .map(|(k, x)| {
+                let mut a = self.prior(x).information;
+                if let Some((folded, _)) = part.folded {
+                    for (row, more) in a.iter_mut().zip(&folded[k]) {
+                        for (x, m) in row.iter_mut().zip(more) {
+                            *x += m;
+                        }
+                    }
+                }
+                a
+            })
+            .collect();
+        for (edge, worth) in part.edges.iter().zip(part.worth) {
+            let x = &part.objects[edge.object];
+            if let Some((h, m, n, _, _)) = self.information_of(edge.look, x) {
+                let weight = edge.weight * worth;
+                add_object_information(&mut information[edge.object], &h, &m, n, weight);
+            }
+        }
+        information.iter().map(inverse_or_zero).collect()
+    }
+
+    /// A detection's derivatives by the object and the information of its rows, its pose uncertain;
+    /// with the residual and the variances of the reading.
+    #[expect(clippy::type_complexity, reason = "parts of one linearisation")]
+    pub(super) fn information_of(
+        &self,
+        look: usize,
+        x: &[f64; 4],
+    ) -> Option<(Square4, Square4, usize, [f64; 4], ByPose)> {
+        let detection = &self.looks[look];
+        let seen = self.expect(detection.view, x)?;
+        let (by_object, by_pose) = seen.of(detection);
+        let spread = pose_spread(&by_pose, &self.pose_cov[detection.view], detection.n);
+        let noise = with_noise(&spread, &self.looseness[look], 1.0);
+        let factor = Factor4::new(&noise, detection.n)?;
+        let mut information = factor.inverse();
+        for (r, row) in information.iter_mut().enumerate() {
+            for (c, value) in row.iter_mut().enumerate() {
+                if !(detection.has[r] && detection.has[c]) {
+                    *value = 0.0;
+                }
+            }
+        }
+        let e = seen.residual(detection);
+        Some((by_object, information, detection.n, e, by_pose))
+    }
+
+    /// Conditional covariances of poses, the objects known as other views know them.
+    pub(super) fn update_pose_cov(&mut self) {
+        let support = self.support();
+        let mut information: Vec<Square6> = (0..self.n_views())
+            .map(|view| {
+                let prior = self.pose_information(view);
+                let mut a = [[0.0; 6]; 6];
+                for (i, row) in a.iter_mut().enumerate() {
+                    row[i] = prior[i];
+                }
+                a
+            })
+            .collect();
+        for edge in &self.edges {
+            if support[edge.object] - edge.weight <= 0.3 {
+                continue;
+            }
+            let look = &self.looks[edge.look];
+            let Some(seen) = self.expect(look.view, &self.objects[edge.object]) else {
+                continue;
+            };
+            let (by_object, by_pose) = seen.of(look);
+            let spread = object_spread(&by_object, &self.object_cov[edge.object], look.n);
+            let variances = &self.looseness[edge.look];
+            let Some(factor) = Factor4::new(&with_noise(&spread, variances, 1.0), look.n) else {
+                continue;
+            };
+            let trust = robust_weight(&seen.residual(look), variances, look.n_rows());
+            let m = factor.inverse();
+            add_pose_information(
+                &mut information[look.view],
+                &by_pose,
+                &m,
+                look.n,
+                edge.weight * trust,
+            );
+        }
+        for (view, a) in information.iter().enumerate() {
+            if let Some((cov, _)) = inverse6(a) {
+                self.pose_cov[view] = cov;
+            }
+        }
+    }
+
+    /// Gauss-Newton steps of all objects and poses; with marginal covariances of the last if asked.
+    pub(super) fn adjust(&mut self, steps: usize, robust: Robust, marginals: bool) -> Option<Stepped> {
+        let edges = std::mem::take(&mut self.edges);
+        let mut objects = std::mem::take(&mut self.objects);
+        let of: Vec<(usize, usize)> = edges
+            .iter()
+            .map(|e| (e.object, self.looks[e.look].view))
+            .collect();
+        let moving: Vec<usize> = (0..self.n_views()).collect();
+        let mut last = None;
+        for at in 0..steps {
+            let worth = self.worth(&objects, &of, Repeats::Errors);
+            let part = Part {
+                objects: &mut objects,
+                edges: &edges,
+                worth: &worth,
+                moving: &moving,
+                folded: None,
+            };
+            let stepped = self.step(part, robust, marginals && at + 1 == steps);
+            let still = stepped.move_m < 1e-5;
+            self.object_cov.clone_from(&stepped.conditional);
+            last = Some(stepped);
+            if still && !marginals {
+                break;
+            }
+        }
+        self.edges = edges;
+        self.objects = objects;
+        if self.corrects_poses() {
+            self.update_pose_cov();
+        }
+        last
+    }
+}
+
+impl Row {
+    /// The weighted residual.
+    fn toward(&self) -> [f64; 4] {
+        times(&self.information, &self.e)
+    }
+
+    fn object_pull(&self, toward: &[f64; 4]) -> [f64; 4] {
+        std::array::from_fn(|i| (0..self.n).map(|r| self.by_object[r][i] * toward[r]).sum())
+    }
+
+    /// Adds to a pose's information; the rows' own is diagonal where poses move.
+    fn add_to_pose(
+        &self,
+        a: &mut SMatrix<f64, 6, 6>,
+        b: &mut Vector6<f64>,
+        toward: &[f64; 4],
+    ) {
+        for r in 0..self.n {
+            let w = self.information[r][r];
+            if w == 0.0 {
+                continue;
+            }
+            let h = &self.by_pose[r];
+            for c in 0..6 {
+                b[c] += h[c] * toward[r];
+                let scale = w * h[c];
+                let mut column = a.column_mut(c);
+                for (x, y) in column.iter_mut().zip(h) {
+                    *x += scale * y;
+                }
+            }
+        }
+    }
+
+    fn coupling(&self) -> SMatrix<f64, 4, 6> {
+        let mut out = SMatrix::<f64, 4, 6>::zeros();
+        for r in 0..self.n {
+            let w = self.information[r][r];
+            for c in 0..6 {
+                let scale = w * self.by_pose[r][c];
+                for i in 0..4 {
+                    out[(i, c)] += scale * self.by_object[r][i];
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Adds `w h^T m h` to the information of a pose.
+pub(super) fn add_pose_information(
+    a: &mut Square6,
+    h: &ByPose,
+    m: &Square4,
+    n: usize,
+    w: f64,
+) {
+    for r in 0..n {
+        let mut left = [0.0; 6];
+        for s in 0..n {
+            for (l, x) in left.iter_mut().zip(&h[s]) {
+                *l += m[r][s] * x;
+            }
+        }
+        for (i, row) in a.iter_mut().enumerate() {
+            let scale = w * h[r][i];
+            for (x, l) in row.iter_mut().zip(&left) {
+                *x += scale * l;
+            }
+        }
+    }
+}
+
+fn times(a: &Square4, b: &[f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|i| a[i].iter().zip(b).map(|(a, b)| a * b).sum())
+}
+
+fn inverse_or_zero(a: &Square4) -> Square4 {
+    inverse4(a).map_or([[0.0; 4]; 4], |(inverse, _)| inverse)
+}
+
+type ObjectBlock = (SMatrix<f64, 4, 4>, Vector4<f64>);
+type PoseBlock = (SMatrix<f64, 6, 6>, Vector6<f64>);
+type Coupling = (usize, usize, SMatrix<f64, 4, 6>);
+type Diagonals = (Vec<SMatrix<f64, 4, 4>>, Vec<SMatrix<f64, 6, 6>>);
+type Solution = (Vec<Vector4<f64>>, Vec<Vector6<f64>>, Option<Diagonals>);
+
+fn poses_kept(
+    objects: Vec<ObjectBlock>,
+    poses: Vec<PoseBlock>,
+    mut couplings: Vec<Coupling>,
+    marginals: bool,
+) -> Option<Solution> {
+    couplings.sort_by_key(|&(object, view, _)| (object, view));
+    let arrow = Arrow {
+        kept: poses,
+        eliminated: objects,
+        couplings,
+    };
+    let solved: Solved<6, 4> = arrow.solve()?;
+    let diagonals = marginals.then(|| {
+        let (poses, objects) = solved.covariances();
+        (objects, poses)
+    });
+    Some((solved.eliminated, solved.kept, diagonals))
+}
+
+fn objects_kept(
+    objects: Vec<ObjectBlock>,
+    poses: Vec<PoseBlock>,
+    couplings: Vec<Coupling>,
+    marginals: bool,
+) -> Option<Solution> {
+    let mut turned: Vec<(usize, usize, SMatrix<f64, 6, 4>)> = couplings
+        .iter()
+        .map(|(object, view, block)| (*view, *object, block.transpose()))
+        .collect();
+    turned.sort_by_key(|&(view, object, _)| (view, object));
+    let arrow = Arrow {
+        kept: objects,
+        eliminated: poses,
+        couplings: turned,
+    };
+    let solved: Solved<4, 6> = arrow.solve()?;
+    let diagonals = marginals.then(|| solved.covariances());
+    Some((solved.kept, solved.eliminated, diagonals))
+}
+
