@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::engine::{Edge, Engine};
 use super::evidence::{Evidence, probability};
+use super::looks::Repeats;
 use super::register::short;
 use super::solve::Robust;
 use crate::fuse::Exclusive;
@@ -67,9 +68,11 @@ impl Engine<'_> {
         let mut memberships = self.memberships(evidence, &odds, &is_own);
         let mut unexplained = vec![1.0; self.looks.len()];
         let mut has_candidate = vec![false; self.looks.len()];
+        let supporters = self.supporters();
         for (c, p) in candidates.iter().zip(&memberships) {
             unexplained[c.look] -= p;
-            has_candidate[c.look] = true;
+            let pair = &pairs[c.pair];
+            has_candidate[c.look] |= self.repeats(&supporters[pair.object], pair.object, pair.view);
         }
         let mut origin: Vec<Option<usize>> = vec![None; self.looks.len()];
         for (i, c) in candidates.iter().enumerate() {
@@ -112,6 +115,33 @@ impl Engine<'_> {
         let support = self.support();
         let keep: Vec<bool> = support.iter().map(|&s| s > LEAST_SUPPORT).collect();
         self.compact(&keep);
+    }
+
+    /// Of every object the views that detected it, ascending.
+    fn supporters(&self) -> Vec<Vec<usize>> {
+        let mut views: Vec<Vec<usize>> = vec![Vec::new(); self.objects.len()];
+        for edge in &self.edges {
+            if edge.weight > 0.5 {
+                views[edge.object].push(self.looks[edge.look].view);
+            }
+        }
+        for views in &mut views {
+            views.sort_unstable();
+            views.dedup();
+        }
+        views
+    }
+
+    /// Whether a view sees an object so shortly before or after another that detected it, that a
+    /// detection off the mark is more of the same error than of another object.
+    fn repeats(&self, supporters: &[usize], object: usize, view: usize) -> bool {
+        let after = supporters.partition_point(|&v| v <= view);
+        let before = supporters[..after].iter().rev().find(|&&v| v != view);
+        let neighbours = before.into_iter().chain(supporters.get(after));
+        let x = &self.objects[object];
+        neighbours
+            .into_iter()
+            .any(|&v| self.apart(x, v, view, Repeats::Errors) < super::learn::knob(3, 0.5))
     }
 
     /// The weight that each candidate had in the last round.

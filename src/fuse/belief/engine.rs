@@ -31,6 +31,36 @@ impl Normal {
     }
 }
 
+/// Logits of the scores of objects and of clutter: normal, of one variance, so that a higher score
+/// never speaks against an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scores {
+    pub(super) object: f64,
+    pub(super) clutter: f64,
+    pub(super) variance: f64,
+}
+
+impl Scores {
+    /// A score alone says no more than this, for or against.
+    const MOST: f64 = 5.0;
+
+    /// Log-odds of object against clutter at a logit.
+    pub(super) fn odds(&self, logit: f64) -> f64 {
+        let slope = ((self.object - self.clutter) / self.variance).max(0.0);
+        let middle = 0.5 * (self.object + self.clutter);
+        (slope * (logit - middle)).clamp(-Self::MOST, Self::MOST)
+    }
+
+    /// Logarithm of the density at an object's logit.
+    pub(super) fn ln_object(&self, logit: f64) -> f64 {
+        Normal {
+            mean: self.object,
+            variance: self.variance,
+        }
+        .ln(logit)
+    }
+}
+
 /// What is learnt (3.5).
 #[derive(Debug, Clone)]
 pub(super) struct Model {
@@ -51,8 +81,8 @@ pub(super) struct Model {
     /// Objects, 1/m^2.
     pub(super) density: f64,
     pub(super) curve: Detectability,
-    /// What a logit of the score says for an object against clutter: constant and slope.
-    pub(super) score: (f64, f64),
+    /// Logits of scores, where detections have them.
+    pub(super) scores: Option<Scores>,
 }
 
 /// That a detection is of an object, with a probability.
@@ -141,7 +171,7 @@ impl<'a> Engine<'a> {
             transients: 0.0,
             density: 1.0,
             curve: Detectability::new(0.0, 1.0, 1),
-            score: (0.0, 0.0),
+            scores: None,
         };
         let mut engine = Self {
             surface: problem.surface,
@@ -316,8 +346,8 @@ impl<'a> Engine<'a> {
 
     /// What the detector's score says for an object against clutter.
     pub(super) fn score_odds(&self, look: &Look) -> f64 {
-        let (constant, slope) = self.model.score;
-        look.logit.map_or(0.0, |x| (constant + slope * x).clamp(-6.0, 6.0))
+        let scores = self.model.scores.as_ref().zip(look.logit);
+        scores.map_or(0.0, |(scores, x)| scores.odds(x))
     }
 
     pub(super) fn set_density(&mut self, density: f64) {

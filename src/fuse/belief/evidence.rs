@@ -76,7 +76,7 @@ impl Engine<'_> {
             let rows = (look.n, look.n_rows());
             let factor = Factor4::new(&with_noise(&spread, variances, 1.0), look.n);
             let likelihood = log_likelihood(&e, &spread, variances, rows);
-            if let (Some(factor), Some((ln_likelihood, _))) = (factor, likelihood) {
+            if let (Some(factor), Some((ln_likelihood, ..))) = (factor, likelihood) {
                 log_odds[k] += weight * (ln_likelihood - self.background[edge.look].clutter);
                 let m = factor.inverse();
                 add_object_information(&mut information[k], &by_object, &m, look.n, weight);

@@ -2,10 +2,11 @@
 //! expectation maximisation.
 
 use super::algebra::{object_spread, pose_spread};
-use super::engine::{Engine, START_CLUTTER, START_TRANSIENTS};
+use super::engine::{Engine, START_CLUTTER, START_TRANSIENTS, Scores};
 use super::evidence::{Evidence, probability};
 use super::looks::Repeats;
 use super::noise::robust_weight;
+use super::single::LEAST_SCORE_VARIANCE;
 
 /// The stated noise counts for this many readings.
 const NOISE_COUNT: f64 = 10.0;
@@ -26,6 +27,39 @@ const SIZE_COUNT: f64 = 5.0;
 /// Variances of sizes, and of clutter's, are kept between these.
 const SIZE_VARIANCES: (f64, f64) = (0.003, 2.0);
 const CLUTTER_VARIANCES: (f64, f64) = (0.05, 2.0);
+/// That scores say nothing counts for this many detections of each kind.
+const SCORE_COUNT: f64 = 3.0;
+
+/// Weighted moments about a first guess that counts for some weight.
+struct Moments {
+    n: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Moments {
+    fn new(n: f64, at: f64) -> Self {
+        Self {
+            n,
+            sum: n * at,
+            squares: n * at * at,
+        }
+    }
+
+    fn add(&mut self, weight: f64, x: f64) {
+        self.n += weight;
+        self.sum += weight * x;
+        self.squares += weight * x * x;
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / self.n
+    }
+
+    fn scatter(&self) -> f64 {
+        (self.squares - self.sum * self.sum / self.n).max(0.0)
+    }
+}
 
 impl Engine<'_> {
     /// Sets the model to what the data suggest, given what speaks for each object.
@@ -39,6 +73,7 @@ impl Engine<'_> {
         self.learn_heights(&real, &support);
         self.learn_rates(evidence, &real, &support);
         self.learn_curve(evidence, &real, &support);
+        self.learn_scores(evidence);
         self.looseness = self.looks.iter().map(|l| self.variances(l)).collect();
     }
 
@@ -170,7 +205,7 @@ impl Engine<'_> {
         #[expect(clippy::cast_precision_loss, reason = "a count of views")]
         let n_views = self.n_views() as f64 + 1.0;
         self.model.clutter = clutter / n_views;
-        self.model.transients = transients / n_views / self.view_area_m2;
+        self.model.transients = transients / n_views / self.view_area_m2 * knob(0, 1.0);
         let mut missed = vec![0.0; self.objects.len()];
         for (pair, worth) in evidence.expectation.pairs.iter().zip(&evidence.worth) {
             missed[pair.object] += worth * (-pair.p_detect).ln_1p();
@@ -226,6 +261,40 @@ impl Engine<'_> {
         self.model.size.variance = (scatter / n).clamp(SIZE_VARIANCES.0, SIZE_VARIANCES.1);
     }
 
+    /// Scores of objects and of clutter. Whether a detection's object is real is judged without the
+    /// score of that detection, so that what scores say does not confirm itself.
+    fn learn_scores(&mut self, evidence: &Evidence) {
+        let Some(scores) = self.model.scores else {
+            return;
+        };
+        let overall = 0.5 * (scores.object + scores.clutter);
+        let mut object = Moments::new(SCORE_COUNT, overall);
+        let mut clutter = Moments::new(SCORE_COUNT, overall);
+        let mut unowned = vec![1.0; self.looks.len()];
+        for (edge, worth) in self.edges.iter().zip(&evidence.edge_worth) {
+            let look = &self.looks[edge.look];
+            let Some(logit) = look.logit else { continue };
+            unowned[edge.look] -= edge.weight;
+            let own = edge.weight * worth * self.score_odds(look);
+            let real = probability(evidence.log_odds[edge.object] - own);
+            object.add(edge.weight * real, logit);
+            clutter.add(edge.weight * (1.0 - real), logit);
+        }
+        for (look, rest) in self.looks.iter().zip(&unowned) {
+            if let Some(logit) = look.logit {
+                clutter.add(rest.max(0.0), logit);
+            }
+        }
+        let (object_mean, clutter_mean) = (object.mean(), clutter.mean());
+        let scatter = object.scatter() + clutter.scatter() + SCORE_COUNT * scores.variance;
+        let variance = scatter / (object.n + clutter.n - SCORE_COUNT);
+        self.model.scores = Some(Scores {
+            object: object_mean,
+            clutter: clutter_mean,
+            variance: variance.max(LEAST_SCORE_VARIANCE),
+        });
+    }
+
     /// Hits and misses of real objects that other views saw too: leaving the view itself out of the
     /// choice keeps it free of bias.
     fn learn_curve(&mut self, evidence: &Evidence, real: &[f64], support: &[f64]) {
@@ -246,4 +315,9 @@ impl Engine<'_> {
         curve.learn(chances);
         self.model.curve = curve;
     }
+}
+
+/// Experiments.
+pub(super) fn knob(i: usize, default: f64) -> f64 {
+    std::env::var(format!("KNOB{i}")).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }

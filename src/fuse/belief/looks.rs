@@ -44,7 +44,8 @@ impl Engine<'_> {
         worth
     }
 
-    fn apart(&self, object: &[f64; 4], a: usize, b: usize, repeats: Repeats) -> f64 {
+    /// How far apart two looks at an object are: 0 the same, 1 independent.
+    pub(super) fn apart(&self, object: &[f64; 4], a: usize, b: usize, repeats: Repeats) -> f64 {
         if a == b {
             return 1.0;
         }

@@ -204,7 +204,7 @@ impl Engine<'_> {
             &self.looseness[edge.look],
             (look.n, look.n_rows()),
         );
-        found.map_or(0.0, |(l, _)| l - self.background[edge.look].all)
+        found.map_or(0.0, |(l, ..)| l - self.background[edge.look].all)
     }
 }
 

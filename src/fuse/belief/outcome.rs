@@ -89,16 +89,43 @@ pub struct BeliefEvidence {
     pub transients_per_view: f64,
     /// Objects, 1/m^2.
     pub density_per_m2: f64,
+    /// Mean logits of the scores of objects and of clutter, and their variance.
+    pub scores: Option<[f64; 3]>,
     /// Probability of detection by apparent size or range.
     pub detectability: Vec<f64>,
 }
 
 /// Fuses measurements of many views into one map.
 pub fn fuse_belief(problem: &Problem<'_>, settings: &BeliefSettings) -> Belief {
-    let mut engine = Engine::new(problem, settings);
-    let order: Vec<usize> = (0..engine.n_views()).collect();
+    let fresh = Engine::new(problem, settings);
+    let order: Vec<usize> = (0..fresh.n_views()).collect();
+    let mut engine = fresh.clone();
     engine.sequence(&order);
-    let (evidence, rounds, converged) = engine.refine();
+    let (mut evidence, mut rounds, mut converged) = engine.refine();
+    let mut best = engine.objective(&evidence);
+    let debug = std::env::var("DEBUGJ").is_ok();
+    if debug { eprintln!("J first {best:.1}"); }
+    let n_pass = super::learn::knob(4, 1.0) as usize;
+    for pass in 1..n_pass {
+        let mut again = fresh.clone();
+        again.model = engine.model.clone();
+        again.reset_pose_cov();
+        again.settle();
+        again.weigh_background();
+        let mut order = order.clone();
+        if pass == 2 { order.reverse(); }
+        again.sequence(&order);
+        let (e, r, c) = again.refine();
+        let j = again.objective(&e);
+        if debug { eprintln!("J pass {pass} {j:.1}"); }
+        if j > best {
+            best = j;
+            engine = again;
+            evidence = e;
+            rounds = r;
+            converged = c;
+        }
+    }
     engine.outcome(problem, evidence, (rounds, converged))
 }
 
@@ -128,6 +155,35 @@ impl Engine<'_> {
             }
         }
         (evidence, ROUNDS, false)
+    }
+
+    /// Logarithm of the posterior, up to a constant: every detection clutter, what each object adds
+    /// to that, and the poses.
+    fn objective(&self, evidence: &Evidence) -> f64 {
+        let clutter: f64 = self.background.iter().map(|b| b.clutter).sum();
+        let objects: f64 = evidence
+            .log_odds
+            .iter()
+            .map(|&l| super::noise::ln_add(0.0, l.clamp(-50.0, 500.0)))
+            .sum();
+        let scores: f64 = self.model.scores.map_or(0.0, |scores| {
+            let logits = self.looks.iter().filter_map(|l| l.logit);
+            logits.map(|x| scores.ln_object(x)).sum()
+        });
+        let mut poses = scores;
+        if self.corrects_poses() {
+            for view in 0..self.n_views() {
+                let information = self.pose_information(view);
+                for (d, i) in self.delta[view].iter().zip(&information) {
+                    poses -= 0.5 * d * d * i;
+                }
+                poses -= self.model.pose_scale.iter().map(|s| s.ln()).sum::<f64>();
+                if let Some((_, ln_det)) = super::algebra::inverse6(&self.pose_cov[view]) {
+                    poses += 0.5 * ln_det;
+                }
+            }
+        }
+        clutter + objects + poses
     }
 
     fn outcome(
@@ -208,6 +264,7 @@ impl Engine<'_> {
                 clutter_per_view: m.clutter,
                 transients_per_view: m.transients * self.view_area_m2,
                 density_per_m2: m.density,
+                scores: m.scores.map(|s| [s.object, s.clutter, s.variance]),
                 detectability: m.curve.values().to_vec(),
             },
         }

@@ -57,9 +57,10 @@ impl Engine<'_> {
                 self.take_in(view, &mut map, &mut exclusive);
             }
             self.found_new(view, &mut map);
-            let window = &order[(at + 1).saturating_sub(WINDOW)..=at];
-            if at >= WINDOW {
-                self.fold(order[at - WINDOW], &mut map);
+            let w = super::learn::knob(6, 24.0) as usize;
+            let window = &order[(at + 1).saturating_sub(w)..=at];
+            if at >= w {
+                self.fold(order[at - w], &mut map);
             }
             self.settle_window(view, window, &mut map);
         }
@@ -113,7 +114,7 @@ impl Engine<'_> {
         let mut joining: Vec<usize> = (0..p.len())
             .filter(|&i| {
                 let look = found.candidates[i].candidate.look;
-                total[look - first] > JOINS && p[i] > LEAST_MEMBERSHIP
+                total[look - first] > JOINS && p[i] > super::learn::knob(5, LEAST_MEMBERSHIP)
             })
             .collect();
         joining.sort_by(|&a, &b| p[b].total_cmp(&p[a]).then(a.cmp(&b)));

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::algebra::{Factor4, Square4, add_object_information, inverse4, pose_spread};
 use super::curve::Detectability;
 use super::data::Look;
-use super::engine::{Engine, Normal, START_CLUTTER, START_TRANSIENTS};
+use super::engine::{Engine, Normal, START_CLUTTER, START_TRANSIENTS, Scores};
 use super::noise::with_noise;
 use crate::frame::{Direction, Enu, Pixel, Point, Ray};
 
@@ -20,6 +20,8 @@ const STILL_M: f64 = 1e-7;
 const FAR: (f64, f64) = (1.5, 20.0);
 /// A first guess of the logarithm of sizes counts for no less variance.
 const LEAST_SIZE_VARIANCE: f64 = 0.02;
+/// Logits of scores scatter no less than this.
+pub(super) const LEAST_SCORE_VARIANCE: f64 = 0.05;
 
 /// The object that one detection suggests: the most probable one under all its rows and the priors.
 #[derive(Debug, Clone, Copy)]
@@ -61,6 +63,7 @@ impl Engine<'_> {
         }
         self.keep_trusted();
         self.set_curve();
+        self.begin_scores();
         self.measure_ground();
         let n = self.n_views().max(1);
         #[expect(clippy::cast_precision_loss, reason = "a count")]
@@ -267,6 +270,23 @@ impl Engine<'_> {
         self.index();
         let all: Vec<f64> = self.looks.iter().filter_map(|l| l.log_px).collect();
         self.model.clutter_size = clutter_size(&all);
+    }
+
+    /// Before anything is fused scores say nothing; but how they scatter is known.
+    fn begin_scores(&mut self) {
+        let logits: Vec<f64> = self.looks.iter().filter_map(|l| l.logit).collect();
+        if logits.len() < 2 {
+            return;
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a count")]
+        let n = logits.len() as f64;
+        let mean = logits.iter().sum::<f64>() / n;
+        let variance = logits.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+        self.model.scores = Some(Scores {
+            object: mean,
+            clutter: mean,
+            variance: variance.max(LEAST_SCORE_VARIANCE),
+        });
     }
 
     fn set_curve(&mut self) {
