@@ -100,6 +100,8 @@ pub(super) struct Background {
     pub(super) uniform: f64,
     /// Uniform clutter and transients.
     pub(super) clutter: f64,
+    /// An object not yet known.
+    pub(super) new: f64,
     /// Any of them, or an object not yet known.
     pub(super) all: f64,
 }
@@ -340,6 +342,7 @@ impl<'a> Engine<'a> {
         Background {
             uniform,
             clutter,
+            new,
             all: ln_add(clutter, new),
         }
     }

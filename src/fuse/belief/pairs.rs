@@ -41,6 +41,8 @@ pub(super) struct PairInFull {
     pub(super) by_pose: Square4,
     /// Pose and object together.
     pub(super) spread: Square4,
+    /// Probability that the object exists.
+    pub(super) exists: f64,
 }
 
 /// A detection that may be of an object.
@@ -84,6 +86,8 @@ pub(super) struct Candidates<'a> {
     pub(super) objects: &'a [[f64; 4]],
     pub(super) cov: &'a [Square4],
     pub(super) classes: &'a [usize],
+    /// Probabilities that they exist; all do where there are none.
+    pub(super) exist: &'a [f64],
     pub(super) near: &'a Buckets,
 }
 
@@ -100,6 +104,7 @@ impl Engine<'_> {
             objects: &self.objects,
             cov: &self.object_cov,
             classes: &self.classes,
+            exist: &[],
             near: &near,
         };
         let views: Vec<(Vec<Pair>, Vec<Candidate>)> = (0..self.n_views())
@@ -144,7 +149,8 @@ impl Engine<'_> {
             if away > reach_m {
                 continue;
             }
-            if let Some(pair) = self.pair(view, k, x, &among.cov[k], pose_cov) {
+            if let Some(mut pair) = self.pair(view, k, x, &among.cov[k], pose_cov) {
+                pair.exists = among.exist.get(k).copied().unwrap_or(1.0);
                 found.pairs.push(pair);
             }
         }
@@ -198,6 +204,7 @@ impl Engine<'_> {
             seen,
             by_pose,
             spread,
+            exists: 1.0,
         })
     }
 

@@ -18,8 +18,6 @@ const SECOND_MATCHES: usize = 40;
 const SECOND_GATE: f64 = 9.0;
 /// Rounds of association and correction after the best hypothesis.
 const ROUNDS: usize = 4;
-/// Objects of the map are taken to exist with this probability.
-pub(super) const EXISTS: f64 = 0.9;
 /// Exponents are cut to this.
 const MOST_EXPONENT: f64 = 50.0;
 
@@ -140,7 +138,8 @@ impl Engine<'_> {
         let mut odds = Vec::with_capacity(found.candidates.len());
         for c in &found.candidates {
             let candidate = c.candidate;
-            let p = EXISTS * found.pairs[candidate.pair].pair.p_detect;
+            let pair = &found.pairs[candidate.pair];
+            let p = pair.exists * pair.pair.p_detect;
             let exponent = candidate.ln_likelihood - self.background[candidate.look].all;
             let exponent = exponent.clamp(-MOST_EXPONENT, MOST_EXPONENT);
             odds.push(exponent.exp() * p / (1.0 - p));
@@ -160,7 +159,8 @@ impl Engine<'_> {
             let candidate = c.candidate;
             let exponent = candidate.ln_likelihood - self.background[candidate.look].all;
             let odds = exponent.clamp(-MOST_EXPONENT, MOST_EXPONENT).exp();
-            sums[candidate.look - first] += odds * found.pairs[candidate.pair].pair.p_detect;
+            let pair = &found.pairs[candidate.pair];
+            sums[candidate.look - first] += odds * pair.exists * pair.pair.p_detect;
         }
         sums.iter().map(|s: &f64| s.ln_1p()).sum()
     }
@@ -186,7 +186,7 @@ impl Engine<'_> {
                     e: c.e,
                     by_pose,
                     without_pose: spread_without_pose(pair, c, look),
-                    base: pair.pair.p_detect.ln()
+                    base: (pair.exists * pair.pair.p_detect).ln()
                         - self.background[c.candidate.look].all
                         - unit * look.n_rows(),
                     ambiguity: count[local],

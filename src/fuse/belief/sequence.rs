@@ -2,6 +2,7 @@
 
 use super::algebra::Square4;
 use super::engine::{Edge, Engine};
+use super::evidence::probability;
 use super::looks::Repeats;
 use super::near::Buckets;
 use super::noise::robust_weight;
@@ -28,6 +29,9 @@ struct Growing {
     objects: Vec<[f64; 4]>,
     cov: Vec<Square4>,
     classes: Vec<usize>,
+    /// Log-odds that they exist, and the probabilities as registration takes them.
+    log_odds: Vec<f64>,
+    exist: Vec<f64>,
     near: Buckets,
     /// The object of each look.
     own: Vec<Option<usize>>,
@@ -45,6 +49,8 @@ impl Engine<'_> {
             objects: Vec::new(),
             cov: Vec::new(),
             classes: Vec::new(),
+            log_odds: Vec::new(),
+            exist: Vec::new(),
             near: Buckets::new(self.bucket_m()),
             own: vec![None; self.looks.len()],
             worth: vec![1.0; self.looks.len()],
@@ -87,6 +93,7 @@ impl Engine<'_> {
             objects: &map.objects,
             cov: &map.cov,
             classes: &map.classes,
+            exist: &map.exist,
             near: &map.near,
         };
         if self.corrects_poses() {
@@ -125,7 +132,17 @@ impl Engine<'_> {
             if map.own[c.look].is_none() && !taken.contains(&object) {
                 taken.push(object);
                 map.own[c.look] = Some(object);
+                let clutter = self.background[c.look].clutter;
+                map.log_odds[object] += c.ln_likelihood - clutter
+                    + found.pairs[c.pair].pair.p_detect.max(0.02).ln();
             }
+        }
+        for pair in &found.pairs {
+            let k = pair.pair.object;
+            if !taken.contains(&k) {
+                map.log_odds[k] += (-pair.pair.p_detect).ln_1p();
+            }
+            map.exist[k] = likely(map.log_odds[k]);
         }
     }
 
@@ -142,6 +159,9 @@ impl Engine<'_> {
             map.objects.push(single.object);
             map.cov.push(single.cov);
             map.classes.push(self.looks[look].class);
+            let background = &self.background[look];
+            map.log_odds.push(background.new - background.clutter);
+            map.exist.push(likely(background.new - background.clutter));
             map.folded.push([[0.0; 4]; 4]);
             map.toward.push([0.0; 4]);
         }
@@ -244,4 +264,10 @@ impl Engine<'_> {
             map.near.put(k, x[0], x[1]);
         }
     }
+}
+
+/// Registration never takes an object for certain, one way or the other: its own beginnings are
+/// rough.
+fn likely(log_odds: f64) -> f64 {
+    probability(log_odds).clamp(super::learn::knob(7, 0.1), super::learn::knob(8,0.9))
 }
