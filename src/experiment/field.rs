@@ -17,10 +17,11 @@ use crate::simulate::{self, Simulation};
 /// The scene, as it stands in `fixtures/scenes/two-views.toml`.
 const SCENE: &str = include_str!("../../fixtures/scenes/two-views.toml");
 
-/// The method that fuses the views.
-const METHOD: Method = Method::Paper;
+/// The methods that fuse the views. Figure 12 is the first one's, counts and further pictures are
+/// of all: a method that joins this list joins them.
+const METHODS: [Method; 1] = [Method::Paper];
 
-/// The width of its Gaussians, metres; the paper names none. Two well-registered views disagree by
+/// The width of the paper's Gaussians, metres; it names none. Two well-registered views disagree by
 /// much less, and rocks lie closer together than a larger one could tell apart.
 const WIDTH_M: f64 = 0.1;
 
@@ -34,10 +35,17 @@ pub struct FieldCounts {
     pub n_rocks: usize,
     /// Rocks found by the first view alone.
     pub single: Found,
-    /// Rocks found by the two views fused.
-    pub fused: Found,
-    /// The method that fused them.
+    /// Rocks found by the two views fused, by method; the first is the paper's.
+    pub fused: Vec<FoundBy>,
+}
+
+/// What a method's map of both views says of the common field of view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct FoundBy {
+    /// The method's name.
     pub method: &'static str,
+    /// What its map says.
+    pub found: Found,
 }
 
 /// What a map says of the common field of view.
@@ -55,8 +63,8 @@ pub struct Field {
     config: Config,
     inputs: Inputs,
     ground: Ground,
-    /// The map of both views.
-    fused: Fusion,
+    /// The maps of both views, by method.
+    fused: Vec<(Method, Fusion)>,
 }
 
 impl Field {
@@ -77,18 +85,22 @@ impl Field {
     pub fn play_scene(scene: &simulate::Scene, folder: &Path) -> Result<Self, Error> {
         let simulation = simulate::simulate(scene);
         simulate::write(&simulation, folder)?;
-        let overrides = Overrides {
-            set: vec![
-                format!("fusion.method={}", METHOD.name()),
-                "fusion.min_weight=0.5".to_owned(),
-                format!("fusion.width_m={WIDTH_M}"),
-            ],
-            ..Overrides::default()
+        let config_of = |method: Method| {
+            let overrides = Overrides {
+                set: settings(method),
+                ..Overrides::default()
+            };
+            Config::read(&folder.join("pipeline.toml"), &overrides)
         };
-        let config = Config::read(&folder.join("pipeline.toml"), &overrides)?;
+        let config = config_of(METHODS[0])?;
         let inputs = pipeline::read(&config, &Silent)?;
         let ground = pipeline::place(&config, &inputs, &Silent);
-        let fused = pipeline::fuse(&config, &ground, &Silent);
+        let fuse = |method: Method| {
+            let fusion = pipeline::fuse(&config_of(method)?, &ground, &Silent);
+            Ok((method, fusion))
+        };
+        let fused = METHODS.into_iter().map(fuse);
+        let fused = fused.collect::<Result<_, Error>>()?;
         Ok(Self {
             simulation,
             config,
@@ -135,12 +147,25 @@ impl Field {
         self.annotated(&[], "view 1 alone")
     }
 
-    /// Figure 12: the rocks of both views in the first one's picture.
+    /// Figure 12: the rocks of both views in the first one's picture, by method, with the picture's
+    /// name.
     ///
     /// # Errors
     /// As [`Field::picture`].
-    pub fn fused_picture(&self) -> Result<Picture, Error> {
-        let rocks = self.scene().rock_map(&self.fused);
+    pub fn fused_pictures(&self) -> Result<Vec<(String, Picture)>, Error> {
+        let picture = |(index, (method, fusion)): (usize, &(Method, Fusion))| {
+            let name = if index == 0 {
+                "figure-12.jpg".to_owned()
+            } else {
+                format!("figure-12-{}.jpg", method.name())
+            };
+            Ok((name, self.fused_picture(fusion)?))
+        };
+        self.fused.iter().enumerate().map(picture).collect()
+    }
+
+    fn fused_picture(&self, fusion: &Fusion) -> Result<Picture, Error> {
+        let rocks = self.scene().rock_map(fusion);
         let unnamed: Vec<Rock> = rocks
             .into_iter()
             .map(|rock| Rock {
@@ -174,12 +199,21 @@ impl Field {
         let n_rocks = rocks.filter(|r| in_common(r.place.xyz.x, r.place.xyz.y));
         let placed = self.ground.placed.iter().filter(|p| p.view == 0);
         let single: Vec<_> = placed.map(|p| p.hit.point).collect();
-        let fused: Vec<_> = self.fused.objects.iter().map(|o| o.place).collect();
+        let found_by = |(method, fusion): &(Method, Fusion)| {
+            let map: Vec<_> = fusion.objects.iter().map(|o| o.place).collect();
+            Ok(FoundBy {
+                method: method.name(),
+                found: self.found(&map, &in_common)?,
+            })
+        };
         Ok(FieldCounts {
             n_rocks: n_rocks.count(),
             single: self.found(&single, &in_common)?,
-            fused: self.found(&fused, &in_common)?,
-            method: METHOD.name(),
+            fused: self
+                .fused
+                .iter()
+                .map(found_by)
+                .collect::<Result<_, Error>>()?,
         })
     }
 
@@ -236,4 +270,14 @@ impl Field {
     fn scene(&self) -> Scene<'_> {
         self.ground.scene(&self.config, &self.inputs)
     }
+}
+
+/// What is laid over the scene's pipeline file for a method. A rock seen once counts.
+fn settings(method: Method) -> Vec<String> {
+    let mut settings = vec![format!("fusion.method={}", method.name())];
+    if matches!(method, Method::Em | Method::Paper) {
+        settings.push("fusion.min_weight=0.5".to_owned());
+        settings.push(format!("fusion.width_m={WIDTH_M}"));
+    }
+    settings
 }
