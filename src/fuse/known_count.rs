@@ -48,6 +48,9 @@ impl KnownCount {
 /// places, which rest on few views, do not decide.
 const ANNEALING: [f64; 4] = [4.0, 2.5, 1.6, 1.25];
 
+/// Starts begin with no more views than this, evenly chosen among them.
+const MOST_FIRST_VIEWS: usize = 8;
+
 /// Memberships that change by no more than this are settled enough to take whole assignments from.
 const ROUGH: f64 = 0.01;
 
@@ -57,8 +60,9 @@ const ROUGH: f64 = 0.01;
 /// An observation is its object's place (east, north) with a Gaussian error of its own covariance.
 /// In a view each observation is at most one object and each object at most one observation; what
 /// is neither is clutter, or a miss. The places have no prior. Starts take the views in turn,
-/// beginning with each of them in either direction, match each to the places so far (see
-/// [`assign`](crate::matching::assign)), and iterate:
+/// beginning with each of them (of more than eight, with eight of them) in either direction, match
+/// each to the places so far (see [`assign`](crate::matching::assign)), and iterate with and without
+/// annealing the covariances:
 ///
 /// 1. for each view, the places that the *other* views make of the objects, whose covariance
 ///    together with a detection's own gives the odds of every pair; memberships are the marginals
@@ -67,9 +71,8 @@ const ROUGH: f64 = 0.01;
 ///    none changes. Its evidence (the likelihood, the places integrated out) ranks the starts.
 ///
 /// Step 1 from the best assignment then gives the objects. Their covariance is that of the weighted
-/// mean, with what the memberships leave open. The time grows with the square of the number of
-/// views times the pairs of a view; memory with the pairs. The result depends on the order of views
-/// only where assignments are equally good.
+/// mean, with what the memberships leave open. The time of an iteration grows with the square of the
+/// number of views times the pairs of a view; memory with the pairs.
 pub fn fuse_known_count(observations: &[Observation], settings: &KnownCount) -> Fusion {
     let Some(first) = observations.first() else {
         return Fusion {
@@ -128,11 +131,14 @@ pub fn fuse_known_count(observations: &[Observation], settings: &KnownCount) -> 
     }
 }
 
-/// The orders in which the starts take the views: from each of them on, forwards and backwards.
+/// The orders in which the starts take the views: from each of them on, or from as many as starts
+/// are made with, forwards and backwards.
 fn orders(n_views: usize) -> Vec<Vec<usize>> {
     let from = |first: usize| (0..n_views).map(move |step| (first + step) % n_views);
-    let forwards = (0..n_views).map(|first| from(first).collect());
-    let backwards = (0..n_views).map(|first| from(first + 1).rev().collect());
+    let n_firsts = n_views.min(MOST_FIRST_VIEWS);
+    let firsts = || (0..n_firsts).map(|at| at * n_views / n_firsts);
+    let forwards = firsts().map(|first| from(first).collect());
+    let backwards = firsts().map(|first| from(first + 1).rev().collect());
     // Of one or two views either direction is the other.
     if n_views > 2 {
         forwards.chain(backwards).collect()

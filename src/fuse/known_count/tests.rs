@@ -273,3 +273,23 @@ fn open_memberships_widen_the_covariance() {
     assert!((object.covariance[(0, 0)] - (0.01 / 2.0 + 0.2 * 0.2 / 4.0)).abs() < 1e-6);
     assert!((object.covariance[(1, 1)] - 0.01 / 2.0).abs() < 1e-6);
 }
+
+#[test]
+fn starts_take_every_view_once() {
+    assert_eq!(orders(2), [[0, 1], [1, 0]]);
+    let expected = [
+        [0, 1, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [0, 2, 1],
+        [1, 0, 2],
+        [2, 1, 0],
+    ];
+    assert_eq!(orders(3), expected);
+    let many = orders(21);
+    assert_eq!(many.len(), 16);
+    for mut order in many {
+        order.sort_unstable();
+        assert!(order.into_iter().eq(0..21));
+    }
+}
