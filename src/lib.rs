@@ -13,6 +13,7 @@
 //! | [`view`] | a picture with its pose and camera |
 //! | [`terrain`] | the ground: height at a place, first hit of a ray |
 //! | [`project`] | a detection on the ground, with its uncertainty |
+//! | [`matching`] | optimal assignment of two sides to each other |
 //! | [`fuse`] | detections of many views to one map of objects |
 //! | [`footprint`] | what a view could have seen |
 //! | [`adjust`] | places of objects and errors of poses that agree best with the measurements |
@@ -37,6 +38,8 @@ pub mod terrain;
 pub mod view;
 
 pub mod project;
+
+pub mod matching;
 
 pub mod fuse;
 

@@ -5,12 +5,12 @@ use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::assignment::{Pair, assign};
 use super::map::{Estimate, RockMap};
 use super::truth::{IgnoredPlace, TrueObject};
 use super::{Options, Truth};
 use crate::error::{Error, Fault, Place};
 use crate::frame::{Enu, Geodetic, LocalEnu, Point, Site, Vector};
+use crate::matching::{Pair, assign};
 
 /// Map and truth in one local frame, with what became of every object.
 ///

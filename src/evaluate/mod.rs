@@ -11,7 +11,6 @@
 //! lies within the radius of an ignored place, or of a true object in too few detections: it is
 //! neither right nor wrong.
 
-mod assignment;
 mod association;
 mod comparison;
 mod consistency;
@@ -21,7 +20,7 @@ mod report;
 mod score;
 mod truth;
 
-pub use assignment::{Pair, assign};
+pub use crate::matching::{Pair, assign};
 pub use association::{Association, associate};
 pub use comparison::{
     ComparedEstimate, ComparedTruth, Comparison, EstimateOutcome, Match, TruthOutcome,

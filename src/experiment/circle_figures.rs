@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::circle::{Circle, CircleMethod, Trial};
+use super::circle::{Circle, CircleMethod, Score, Trial};
 use super::plot::{
     Axis, BLUE, GREEN, GREY, PURPLE, Plot, RED, Scale, Shape, VIEWS, cross, mark, polygon, polyline,
 };
@@ -13,13 +13,13 @@ use crate::publish::svg::{Frame, Svg, line, text, title};
 /// last digits.
 const TIE: f64 = 1e-9;
 
-/// Errors of all methods under one circle.
+/// Scores of all methods under one circle.
 #[derive(Debug, Clone)]
 pub struct Column {
     /// The circle.
     pub circle: Circle,
-    /// Errors by method of [`CircleMethod::ALL`] and trial.
-    pub errors: Vec<Vec<f64>>,
+    /// Scores by method of [`CircleMethod::ALL`] and trial.
+    pub scores: Vec<Vec<Score>>,
 }
 
 /// One row of the table of the circle.
@@ -33,12 +33,14 @@ pub struct CircleRow {
     pub n_views: usize,
     /// Mean error over the trials.
     pub error: Mean,
-    /// Median and quartiles.
+    /// Mean error over the trials where objects and estimates are paired best.
+    pub paired_error: Mean,
+    /// Median and quartiles of the error.
     pub spread: BoxStatistics,
     /// The least mean error possible.
     pub bound: f64,
-    /// Whether the method beats standard EM, trial by trial; none for those that fuse nothing and
-    /// for standard EM itself.
+    /// Whether the method beats standard EM, trial by trial; none for standard EM itself and for
+    /// what is no method of fusion.
     pub against_em: Option<SignTest>,
 }
 
@@ -47,29 +49,37 @@ impl Column {
     pub fn new(circle: Circle, n_trials: usize, seed: u64) -> Self {
         Self {
             circle,
-            errors: circle.errors(&CircleMethod::ALL, n_trials, seed),
+            scores: circle.scores(&CircleMethod::ALL, n_trials, seed),
         }
     }
 
-    fn of(&self, method: CircleMethod) -> &[f64] {
+    /// The errors of a method by trial.
+    fn of(&self, method: CircleMethod) -> Vec<f64> {
+        self.scores_of(method).iter().map(|s| s.error).collect()
+    }
+
+    fn scores_of(&self, method: CircleMethod) -> &[Score] {
         let index = CircleMethod::ALL.iter().position(|m| *m == method);
-        index.map_or(&[], |index| &self.errors[index])
+        index.map_or(&[], |index| &self.scores[index])
     }
 
     /// The rows of a table, by method.
     pub fn rows(&self) -> Vec<CircleRow> {
         let row = |method: CircleMethod| {
             let errors = self.of(method);
-            let tested = !matches!(method, CircleMethod::SingleView | CircleMethod::Em)
+            let paired = self.scores_of(method).iter().map(|s| s.paired);
+            let tested = method != CircleMethod::Em
+                && CircleMethod::fusing().any(|fusing| fusing == method)
                 && !errors.is_empty();
             Some(CircleRow {
                 method: method.name(),
                 noise: self.circle.noise,
                 n_views: self.circle.n_views,
-                error: Mean::of(errors)?,
-                spread: BoxStatistics::of(errors)?,
+                error: Mean::of(&errors)?,
+                paired_error: Mean::of(&paired.collect::<Vec<_>>())?,
+                spread: BoxStatistics::of(&errors)?,
                 bound: self.circle.bound(),
-                against_em: tested.then(|| SignTest::of(errors, self.of(CircleMethod::Em), TIE)),
+                against_em: tested.then(|| SignTest::of(&errors, &self.of(CircleMethod::Em), TIE)),
             })
         };
         CircleMethod::ALL.into_iter().filter_map(row).collect()
@@ -207,7 +217,7 @@ fn curve(plot: &Plot, columns: &[Column], method: CircleMethod) -> String {
     let strong = format!("stroke=\"{colour}\" stroke-width=\"1.8\"");
     let means: Vec<(f64, Mean)> = columns
         .iter()
-        .filter_map(|c| Some((c.circle.noise, Mean::of(c.of(method))?)))
+        .filter_map(|c| Some((c.circle.noise, Mean::of(&c.of(method))?)))
         .collect();
     let mut drawn = polyline(means.iter().map(|(x, m)| plot.at(*x, m.mean)), &strong);
     for (x, mean) in means {
@@ -266,14 +276,14 @@ fn legend_6(plot: &Plot) -> String {
         "<line x1=\"{x:.2}\" y1=\"@Y\" x2=\"{:.2}\" y2=\"@Y\" {BOUND}/>\n",
         x + 30.0
     );
-    entry(dashes, "bound: associations known");
+    entry(dashes, "bound: n 2 s² / V");
     drawn
 }
 
 /// Figure 7: error against the number of views, as notched boxes.
 pub fn figure_7(columns: &[Column]) -> String {
     let methods: Vec<CircleMethod> = CircleMethod::fusing().collect();
-    let of_columns = |m: &CircleMethod| columns.iter().flat_map(|c| c.of(*m)).copied().collect();
+    let of_columns = |m: &CircleMethod| columns.iter().flat_map(|c| c.of(*m)).collect();
     let errors: Vec<f64> = methods.iter().flat_map::<Vec<f64>, _>(of_columns).collect();
     let bottom = errors
         .iter()
@@ -285,7 +295,7 @@ pub fn figure_7(columns: &[Column]) -> String {
         frame: Frame {
             x: 68.0,
             y: 44.0,
-            width: 540.0,
+            width: 640.0,
             height: 360.0,
         },
         x: Axis::linear(0.5, count(columns.len()) + 0.5, ""),
@@ -294,7 +304,7 @@ pub fn figure_7(columns: &[Column]) -> String {
             ..Axis::linear(0.8 * bottom, 1.3 * top, "error (sum of squares)")
         },
     };
-    let mut svg = Svg::new(640.0, 468.0);
+    let mut svg = Svg::new(740.0, 468.0);
     svg.push(&plot.y_axis(6.0));
     svg.push(&plot.frame.outline());
     let foot = plot.frame.y + plot.frame.height;
@@ -312,7 +322,7 @@ pub fn figure_7(columns: &[Column]) -> String {
         for (m, &method) in methods.iter().enumerate() {
             let slot = 0.8 / count(methods.len());
             let centre = x - 0.4 + slot * (count(m) + 0.5);
-            if let Some(statistics) = BoxStatistics::of(column.of(method)) {
+            if let Some(statistics) = BoxStatistics::of(&column.of(method)) {
                 svg.push(&notched_box(
                     &plot,
                     centre,
@@ -388,7 +398,7 @@ fn legend_7(plot: &Plot, methods: &[CircleMethod]) -> String {
             y - 10.5
         );
         drawn += &text(x + 30.0, y, method.title(), "font-size=\"13\"");
-        x += 170.0;
+        x += 165.0;
     }
     drawn += &line((x, y - 4.5), (x + 22.0, y - 4.5), BOUND);
     drawn + &text(x + 30.0, y, "bound of the mean", "font-size=\"13\"")

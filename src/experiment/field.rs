@@ -9,7 +9,6 @@ use super::field_map;
 use crate::error::Error;
 use crate::evaluate::{self, Comparison, EstimateOutcome, Truth, TruthOutcome};
 use crate::frame::{Enu, Point};
-use crate::fuse::Fusion;
 use crate::pipeline::{self, Clock, Config, Ground, Inputs, Mapped, Method, Overrides, Silent};
 use crate::publish::{Annotation, Picture, Rock, Scene, annotate};
 use crate::simulate::{self, Simulation};
@@ -17,10 +16,11 @@ use crate::simulate::{self, Simulation};
 /// The scene, as it stands in `fixtures/scenes/two-views.toml`.
 const SCENE: &str = include_str!("../../fixtures/scenes/two-views.toml");
 
-/// The method that fuses the views.
-const METHOD: Method = Method::Paper;
+/// The methods that fuse the views. Figure 12 is the first one's, counts and further pictures are
+/// of all: a method that joins this list joins them.
+const METHODS: [Method; 2] = [Method::Paper, Method::Belief];
 
-/// The width of its Gaussians, metres; the paper names none. Two well-registered views disagree by
+/// The width of the paper's Gaussians, metres; it names none. Two well-registered views disagree by
 /// much less, and rocks lie closer together than a larger one could tell apart.
 const WIDTH_M: f64 = 0.1;
 
@@ -34,10 +34,17 @@ pub struct FieldCounts {
     pub n_rocks: usize,
     /// Rocks found by the first view alone.
     pub single: Found,
-    /// Rocks found by the two views fused.
-    pub fused: Found,
-    /// The method that fused them.
+    /// Rocks found by the two views fused, by method; the first is the paper's.
+    pub fused: Vec<FoundBy>,
+}
+
+/// What a method's map of both views says of the common field of view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct FoundBy {
+    /// The method's name.
     pub method: &'static str,
+    /// What its map says.
+    pub found: Found,
 }
 
 /// What a map says of the common field of view.
@@ -55,8 +62,8 @@ pub struct Field {
     config: Config,
     inputs: Inputs,
     ground: Ground,
-    /// The map of both views.
-    fused: Fusion,
+    /// The maps of both views, by method.
+    fused: Vec<(Method, Mapped)>,
 }
 
 impl Field {
@@ -77,20 +84,23 @@ impl Field {
     pub fn play_scene(scene: &simulate::Scene, folder: &Path) -> Result<Self, Error> {
         let simulation = simulate::simulate(scene);
         simulate::write(&simulation, folder)?;
-        let overrides = Overrides {
-            set: vec![
-                format!("fusion.method={}", METHOD.name()),
-                "fusion.min_weight=0.5".to_owned(),
-                format!("fusion.width_m={WIDTH_M}"),
-            ],
-            ..Overrides::default()
+        let config_of = |method: Method| {
+            let overrides = Overrides {
+                set: settings(method),
+                ..Overrides::default()
+            };
+            Config::read(&folder.join("pipeline.toml"), &overrides)
         };
-        let config = Config::read(&folder.join("pipeline.toml"), &overrides)?;
+        let config = config_of(METHODS[0])?;
         let inputs = pipeline::read(&config, &Silent)?;
-        let Mapped {
-            ground,
-            fusion: fused,
-        } = pipeline::map(&config, &inputs, &mut Clock::start(), &Silent)?;
+        let ground = pipeline::place(&config, &inputs, &Silent);
+        let fuse = |method: Method| {
+            let mut clock = Clock::start();
+            let mapped = pipeline::map(&config_of(method)?, &inputs, &mut clock, &Silent)?;
+            Ok((method, mapped))
+        };
+        let fused = METHODS.into_iter().map(fuse);
+        let fused = fused.collect::<Result<_, Error>>()?;
         Ok(Self {
             simulation,
             config,
@@ -134,15 +144,29 @@ impl Field {
     /// # Errors
     /// As [`Field::picture`].
     pub fn single_view_picture(&self) -> Result<Picture, Error> {
-        self.annotated(&[], "view 1 alone")
+        self.annotated(&self.scene(), &[], "view 1 alone")
     }
 
-    /// Figure 12: the rocks of both views in the first one's picture.
+    /// Figure 12: the rocks of both views in the first one's picture, by method, with the picture's
+    /// name.
     ///
     /// # Errors
     /// As [`Field::picture`].
-    pub fn fused_picture(&self) -> Result<Picture, Error> {
-        let rocks = self.scene().rock_map(&self.fused);
+    pub fn fused_pictures(&self) -> Result<Vec<(String, Picture)>, Error> {
+        let picture = |(index, (method, mapped)): (usize, &(Method, Mapped))| {
+            let name = if index == 0 {
+                "figure-12.jpg".to_owned()
+            } else {
+                format!("figure-12-{}.jpg", method.name())
+            };
+            Ok((name, self.fused_picture(mapped)?))
+        };
+        self.fused.iter().enumerate().map(picture).collect()
+    }
+
+    fn fused_picture(&self, mapped: &Mapped) -> Result<Picture, Error> {
+        let scene = mapped.ground.scene(&self.config, &self.inputs);
+        let rocks = scene.rock_map(&mapped.fusion);
         let unnamed: Vec<Rock> = rocks
             .into_iter()
             .map(|rock| Rock {
@@ -150,14 +174,19 @@ impl Field {
                 ..rock
             })
             .collect();
-        self.annotated(&unnamed, "views 1 and 2 fused")
+        self.annotated(&scene, &unnamed, "views 1 and 2 fused")
     }
 
-    fn annotated(&self, rocks: &[Rock], title: &str) -> Result<Picture, Error> {
+    fn annotated(
+        &self,
+        scene: &Scene<'_>,
+        rocks: &[Rock],
+        title: &str,
+    ) -> Result<Picture, Error> {
         let mut picture = self.picture(0)?;
         let annotation = Annotation {
             title: title.to_owned(),
-            ..self.scene().annotation_of(0, rocks)
+            ..scene.annotation_of(0, rocks)
         };
         annotate(&mut picture, &annotation);
         Ok(picture)
@@ -176,12 +205,23 @@ impl Field {
         let n_rocks = rocks.filter(|r| in_common(r.place.xyz.x, r.place.xyz.y));
         let placed = self.ground.placed.iter().filter(|p| p.view == 0);
         let single: Vec<_> = placed.map(|p| p.hit.point).collect();
-        let fused: Vec<_> = self.fused.objects.iter().map(|o| o.place).collect();
+        let found_by = |(method, mapped): &(Method, Mapped)| {
+            let objects = mapped.fusion.objects.iter();
+            let real = objects.filter(|o| o.p_exist.is_none_or(|p| p >= 0.5));
+            let map: Vec<_> = real.map(|o| o.place).collect();
+            Ok(FoundBy {
+                method: method.name(),
+                found: self.found(&map, &in_common)?,
+            })
+        };
         Ok(FieldCounts {
             n_rocks: n_rocks.count(),
             single: self.found(&single, &in_common)?,
-            fused: self.found(&fused, &in_common)?,
-            method: METHOD.name(),
+            fused: self
+                .fused
+                .iter()
+                .map(found_by)
+                .collect::<Result<_, Error>>()?,
         })
     }
 
@@ -238,4 +278,14 @@ impl Field {
     fn scene(&self) -> Scene<'_> {
         self.ground.scene(&self.config, &self.inputs)
     }
+}
+
+/// What is laid over the scene's pipeline file for a method. A rock seen once counts.
+fn settings(method: Method) -> Vec<String> {
+    let mut settings = vec![format!("fusion.method={}", method.name())];
+    if matches!(method, Method::Em | Method::Paper) {
+        settings.push("fusion.min_weight=0.5".to_owned());
+        settings.push(format!("fusion.width_m={WIDTH_M}"));
+    }
+    settings
 }

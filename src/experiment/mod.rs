@@ -112,10 +112,7 @@ pub fn reproduce(
 
     observer.begin("field", None);
     let field = field_figures(&folder)?;
-    observer.end(&format!(
-        "{} rocks by one view, {} by two",
-        field.single.correct, field.fused.correct
-    ));
+    observer.end(&format!("{} rocks by one view", field.single.correct));
 
     let reproduction = Reproduction {
         run_id,
@@ -181,10 +178,11 @@ fn field_figures(folder: &Folder) -> Result<FieldCounts, Error> {
         ("figure-9.jpg", field.picture(0)?),
         ("figure-10.jpg", field.picture(1)?),
         ("figure-11.jpg", field.single_view_picture()?),
-        ("figure-12.jpg", field.fused_picture()?),
     ];
+    let mut pictures = pictures.map(|(name, p)| (name.to_owned(), p)).to_vec();
+    pictures.extend(field.fused_pictures()?);
     for (name, picture) in pictures {
-        picture.write(&folder.path_of(Path::new(name))?, JPEG_QUALITY)?;
+        picture.write(&folder.path_of(Path::new(&name))?, JPEG_QUALITY)?;
     }
     let counts = field.counts()?;
     let table = Product::new("figures-11-12.csv", report::field_table(&counts));

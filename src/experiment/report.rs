@@ -5,7 +5,8 @@ use std::fmt::{self, Write as _};
 use super::Reproduction;
 use super::circle::{CircleMethod, Trial};
 use super::circle_figures::{CircleRow, Column};
-use super::field::FieldCounts;
+use super::field::{FieldCounts, Found};
+use super::statistics::Mean;
 
 /// Figure 5: every detection, object and centre.
 pub(super) fn trial_table(trial: &Trial, noise: f64) -> String {
@@ -32,20 +33,24 @@ pub(super) fn trial_table(trial: &Trial, noise: f64) -> String {
 /// Figures 6 and 7: means, medians, quartiles, notches and whiskers.
 pub(super) fn circle_table(rows: &[CircleRow]) -> String {
     let mut text = "noise,n_views,method,n_trials,mean,standard_error,median,lower_quartile,\
-                    upper_quartile,notch_low,notch_high,whisker_low,whisker_high,bound\n"
+                    upper_quartile,notch_low,notch_high,whisker_low,whisker_high,\
+                    paired_mean,paired_standard_error,bound\n"
         .to_owned();
     for row in rows {
-        let error = row.error.standard_error;
-        let error = error.map_or_else(String::new, |e| format!("{e:.6}"));
+        let written = |mean: &Mean| {
+            let error = mean.standard_error;
+            let error = error.map_or_else(String::new, |e| format!("{e:.6}"));
+            format!("{:.6},{error}", mean.mean)
+        };
         let s = &row.spread;
         let _ = writeln!(
             text,
-            "{:.2},{},{},{},{:.6},{error},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6}",
+            "{:.2},{},{},{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.6}",
             row.noise,
             row.n_views,
             row.method,
             row.error.n,
-            row.error.mean,
+            written(&row.error),
             s.median,
             s.lower_quartile,
             s.upper_quartile,
@@ -53,6 +58,7 @@ pub(super) fn circle_table(rows: &[CircleRow]) -> String {
             s.notch[1],
             s.whiskers[0],
             s.whiskers[1],
+            written(&row.paired_error),
             row.bound
         );
     }
@@ -64,9 +70,10 @@ pub(super) fn error_table(columns: &[Column]) -> String {
     let names = CircleMethod::ALL.map(CircleMethod::name).join(",");
     let mut text = format!("noise,n_views,trial,{names}\n");
     for column in columns {
-        let n_trials = column.errors.first().map_or(0, Vec::len);
+        let n_trials = column.scores.first().map_or(0, Vec::len);
         for trial in 0..n_trials {
-            let errors = column.errors.iter().map(|e| format!("{:.6}", e[trial]));
+            let errors = column.scores.iter();
+            let errors = errors.map(|s| format!("{:.6}", s[trial].error));
             let errors: Vec<String> = errors.collect();
             let (noise, n_views) = (column.circle.noise, column.circle.n_views);
             let _ = writeln!(
@@ -109,10 +116,8 @@ pub(super) fn sign_table(rows: &[CircleRow]) -> String {
 /// Figures 11 and 12: rocks found within the common field of view.
 pub(super) fn field_table(counts: &FieldCounts) -> String {
     let mut text = "map,n_rocks,correct,wrong\n".to_owned();
-    for (map, found) in [
-        ("single view", counts.single),
-        (counts.method, counts.fused),
-    ] {
+    let fused = counts.fused.iter().map(|by| (by.method, by.found));
+    for (map, found) in std::iter::once(("single view", counts.single)).chain(fused) {
         let (n, correct, wrong) = (counts.n_rocks, found.correct, found.wrong);
         let _ = writeln!(text, "{map},{n},{correct},{wrong}");
     }
@@ -122,19 +127,25 @@ pub(super) fn field_table(counts: &FieldCounts) -> String {
 impl fmt::Display for Reproduction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "Figure 6: error against noise, {} trials", self.n_trials)?;
-        write_rows(f, &self.by_noise, |row| format!("{:.2}", row.noise))?;
+        let noise = |row: &CircleRow| format!("{:.2}", row.noise);
+        write_rows(f, &self.by_noise, noise, |row| &row.error)?;
+        writeln!(f, "\nObjects and estimates paired best")?;
+        write_rows(f, &self.by_noise, noise, |row| &row.paired_error)?;
         writeln!(
             f,
             "\nFigure 7: error against views, {} trials",
             self.n_trials
         )?;
-        write_rows(f, &self.by_views, |row| row.n_views.to_string())?;
+        let views = |row: &CircleRow| row.n_views.to_string();
+        write_rows(f, &self.by_views, views, |row| &row.error)?;
+        writeln!(f, "\nObjects and estimates paired best")?;
+        write_rows(f, &self.by_views, views, |row| &row.paired_error)?;
         writeln!(f, "\nSign test: trials with lower error than em's")?;
         for row in &self.by_noise {
             if let Some(test) = row.against_em {
                 writeln!(
                     f,
-                    "{:<8}{:<8}{:>3} of {:<4}chi-square {:>6.2}, p {:.1e}",
+                    "{:<8}{:<8}{:>3} of {:<5}chi-square {:>6.2}, p {:.1e}",
                     format!("{:.2}", row.noise),
                     row.method,
                     test.wins,
@@ -145,16 +156,17 @@ impl fmt::Display for Reproduction {
             }
         }
         let field = &self.field;
-        writeln!(
+        write!(
             f,
             "\nFigures 11 and 12: of {} rocks that both views could see, {} found by one view \
-             ({} wrong), {} by both ({} wrong)",
-            field.n_rocks,
-            field.single.correct,
-            field.single.wrong,
-            field.fused.correct,
-            field.fused.wrong
-        )
+             ({} wrong)",
+            field.n_rocks, field.single.correct, field.single.wrong
+        )?;
+        for by in &field.fused {
+            let Found { correct, wrong } = by.found;
+            write!(f, ", {correct} by both ({wrong} wrong) with {}", by.method)?;
+        }
+        writeln!(f)
     }
 }
 
@@ -163,6 +175,7 @@ fn write_rows(
     f: &mut fmt::Formatter<'_>,
     rows: &[CircleRow],
     key: impl Fn(&CircleRow) -> String,
+    value: impl Fn(&CircleRow) -> &Mean,
 ) -> fmt::Result {
     write!(f, "{:<8}", "")?;
     for method in CircleMethod::ALL {
@@ -172,8 +185,9 @@ fn write_rows(
     for line in rows.chunks(CircleMethod::ALL.len()) {
         write!(f, "{:<8}", line.first().map(&key).unwrap_or_default())?;
         for row in line {
-            let error = row.error.standard_error.unwrap_or(0.0);
-            write!(f, "{:<20}", format!("{:.4} ± {error:.4}", row.error.mean))?;
+            let mean = value(row);
+            let error = mean.standard_error.unwrap_or(0.0);
+            write!(f, "{:<20}", format!("{:.4} ± {error:.4}", mean.mean))?;
         }
         let bound = line.first().map_or(0.0, |row| row.bound);
         writeln!(f, "{bound:.4}")?;

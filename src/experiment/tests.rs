@@ -54,7 +54,9 @@ fn figures_are_the_same_at_any_number_of_threads() {
         assert!(files.contains_key(Path::new(&format!("figure-{figure}.jpg"))));
     }
     let field = &first.field;
-    assert!(field.single.correct < field.fused.correct && field.fused.correct <= field.n_rocks);
-    assert_eq!(first.by_noise.len(), NOISES.len() * 3);
+    for by in &field.fused {
+        assert!(field.single.correct < by.found.correct && by.found.correct <= field.n_rocks);
+    }
+    assert_eq!(first.by_noise.len(), NOISES.len() * 5);
     assert!(first.to_string().contains("Figure 7"));
 }

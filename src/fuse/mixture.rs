@@ -62,7 +62,7 @@ impl MixtureSettings {
 /// Clusters of less total membership have lost all their observations and are dropped.
 const VANISHED: f64 = 1e-6;
 /// Memberships below this are not listed.
-const LISTED: f64 = 0.01;
+pub(super) const LISTED: f64 = 0.01;
 
 /// Fuses observations, each class by itself.
 pub fn fuse_mixture(

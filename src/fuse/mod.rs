@@ -28,11 +28,13 @@ mod assignment;
 pub mod belief;
 mod exclusive;
 mod gate;
+mod known_count;
 mod merge;
 mod mixture;
 
 pub use assignment::Weights;
 pub use exclusive::{Exclusive, Settled};
+pub use known_count::{KnownCount, fuse_known_count};
 pub use mixture::{MixtureSettings, Start, fuse_mixture};
 
 use nalgebra::Matrix3;
@@ -123,7 +125,8 @@ pub struct SolverEvidence {
     pub converged: bool,
     /// Why it stopped.
     pub stopped: Stopped,
-    /// Logarithm of the mixture's likelihood (up to a constant) before each update of the means.
+    /// Logarithm of the mixture's likelihood (up to a constant) before each update of the means; of
+    /// [`fuse_known_count`], of the best evidence so far after each start.
     pub log_likelihood: Vec<f64>,
     /// The largest move of the last iteration, metres.
     pub last_move_m: f64,

@@ -6,11 +6,11 @@ use std::collections::BinaryHeap;
 /// A pair that may be matched, and what matching it costs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
-    /// Index on the left side, of the estimates.
+    /// Index on the left side.
     pub left: usize,
-    /// Index on the right side, of the truth.
+    /// Index on the right side.
     pub right: usize,
-    /// Cost of the match, in the unit of the unmatched cost (here metres squared).
+    /// Cost of the match, in the unit of the unmatched cost.
     pub cost: f64,
 }
 
