@@ -76,6 +76,7 @@ const ROUGH: f64 = 0.01;
 pub fn fuse_known_count(observations: &[Observation], settings: &KnownCount) -> Fusion {
     let Some(first) = observations.first() else {
         return Fusion {
+            belief: None,
             objects: Vec::new(),
             solver: Vec::new(),
         };
@@ -103,6 +104,7 @@ pub fn fuse_known_count(observations: &[Observation], settings: &KnownCount) -> 
     }
     let Some((_, mut state)) = best else {
         return Fusion {
+            belief: None,
             objects: Vec::new(),
             solver: Vec::new(),
         };
@@ -126,6 +128,7 @@ pub fn fuse_known_count(observations: &[Observation], settings: &KnownCount) -> 
         last_move_m: state.last_move_m,
     };
     Fusion {
+        belief: None,
         objects,
         solver: vec![solver],
     }
@@ -198,6 +201,7 @@ fn object(views: &Views, members: &[(usize, f64)], all: &[Observation], class: u
         covariance,
         class,
         weight,
+        size_m: None,
         p_exist: None,
         members: listed,
     }
