@@ -34,6 +34,7 @@ impl Ground {
     pub fn scene<'a>(&'a self, config: &Config, inputs: &'a Inputs) -> Scene<'a> {
         Scene {
             site: &inputs.site,
+            datum: inputs.datum.as_ref(),
             terrain: inputs.terrain.as_ref(),
             views: &inputs.views,
             detections: &inputs.detections,
