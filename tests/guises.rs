@@ -111,6 +111,9 @@ impl World {
     /// height, west to east, and the map's text.
     fn map(&self, guise: &Guise) -> (Vec<[f64; 3]>, Value) {
         let home = self.write(guise);
+        if let Some(offset_s) = guise.clock_offset_s {
+            self.by_time(home.path(), offset_s);
+        }
         let overrides = Overrides {
             out: Some(home.path().join("out")),
             ..Overrides::default()
@@ -149,6 +152,30 @@ impl World {
         home
     }
 
+    /// Turns poses of images into a log, whose clock is ahead of that of the images.
+    fn by_time(&self, home: &Path, offset_s: f64) {
+        let poses = fs::read_to_string(home.join("poses.csv")).unwrap();
+        let mut log = poses.replacen("image_id", "time", 1);
+        let mut images = "image_id,time,camera,path\n".to_owned();
+        for stop in 0..self.poses.len() {
+            let time_s = 1_128_870_000.5 + 10.0 * stop as f64;
+            log = log.replace(&format!("\ni{stop},"), &format!("\n{time_s},"));
+            writeln!(images, "i{stop},{},mast,", time_s - offset_s).unwrap();
+        }
+        fs::write(home.join("poses.csv"), log).unwrap();
+        fs::write(home.join("images.csv"), images).unwrap();
+    }
+
+    /// A log of poses by a clock that is half a minute ahead.
+    fn by_another_clock(&self) -> Guise {
+        Guise {
+            name: "clock".to_owned(),
+            input: "images = \"images.csv\"\nclock_offset_s = 37.25".to_owned(),
+            clock_offset_s: Some(37.25),
+            ..self.plain(self.site.planet())
+        }
+    }
+
     /// Longitude and latitude as the planet's files have them, and true angles.
     fn plain(&self, planet: Planet) -> Guise {
         let pose = move |place: Geodetic, [roll, pitch, yaw]: [f64; 3]| {
@@ -166,6 +193,7 @@ impl World {
             terrain: None,
             origin_height_m: self.site.origin().height_m,
             files: Vec::new(),
+            clock_offset_s: None,
         }
     }
 
@@ -332,6 +360,7 @@ struct Guise {
     terrain: Option<HeightGrid>,
     origin_height_m: f64,
     files: Vec<(String, Vec<u8>)>,
+    clock_offset_s: Option<f64>,
 }
 
 /// A GTX grid around a place (PROJ: `vgridshift`): 40 m, and half a metre more a degree northwards.
@@ -388,6 +417,7 @@ fn a_site_on_earth() {
         world.offsets(),
         world.north_east_down(),
         world.magnetic(),
+        world.by_another_clock(),
         world.above_geoid(),
     ]);
     assert!(layer.get("crs").is_none());
@@ -500,11 +530,10 @@ fn a_geoid_by_its_code() {
     let output = run(empty.path());
     let error = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{error}");
-    let expected = format!(
-        "site.height: found \"EPSG:5773\" without its grid, expected one of us_nga_egm96_15.tif"
-    );
+    let expected =
+        "site.height: found \"EPSG:5773\" without its grid, expected one of us_nga_egm96_15.tif";
     assert!(
-        error.contains(&expected) && error.contains("PROJ_DATA"),
+        error.contains(expected) && error.contains("PROJ_DATA"),
         "{error}"
     );
     assert!(

@@ -268,9 +268,9 @@ fn crs_from_post(label: &Label, map: Projection, radius_m: f64) -> Result<Affine
     };
     // Global maps count in pixels a degree, and their scale is rounded.
     let step_m = match map {
-        Projection::Equirectangular { true_lat_deg, .. } if true_lat_deg == 0.0 => {
-            by_resolution.or(by_scale)
-        }
+        Projection::Equirectangular {
+            true_lat_deg: 0.0, ..
+        } => by_resolution.or(by_scale),
         _ => by_scale.or(by_resolution),
     };
     let step_m = step_m
