@@ -290,7 +290,7 @@ fn a_hundred_thousand_rays_are_met_where_a_slow_march_meets_them() {
     for (terrain, count, seed, half, longest) in [
         (&solid, 50_000, 11, 39.0, 1.0),
         (&with_holes, 25_000, 12, 45.0, 0.02),
-        (&with_ground_below, 25_000, 13, 39.0, 0.02),
+        (&with_ground_below, 25_000, 13, 60.0, 0.02),
     ] {
         let rays = rays(terrain, count, seed, half);
         let counts = compare(terrain, rays.into_iter(), longest);
