@@ -1,10 +1,19 @@
-//! First hits a second, one thread: constant height, and a model of 1000 x 1000 posts.
+//! First hits, and boxes projected with their covariances, a second on one thread: on constant height,
+//! and on a model of 1000 x 1000 posts.
 
 use std::hint::black_box;
+use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use rockmap::frame::{Crs, Direction, Enu, Geodetic, Planet, Point, Ray, Site};
+use rockmap::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
+use rockmap::detection::{Aim, Detection, Mark, MarkSigma, PixelBox};
+use rockmap::frame::{
+    Crs, Direction, Enu, Geodetic, Planet, Point, Ray, RigidTransform, Rotation, Site, Vector,
+};
+use rockmap::pose::{Pose, PoseSigma};
+use rockmap::project::{self, MarkNoise, Settings};
 use rockmap::terrain::{Affine, HeightGrid, Posts, Terrain};
+use rockmap::view::View;
 
 const RAYS: u32 = 1000;
 
@@ -77,5 +86,113 @@ fn first_hits(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, first_hits);
+/// A mast camera that looks down by 15 degrees.
+fn view(terrain: &Terrain) -> View {
+    let ground = terrain
+        .ground_at(0.0, 0.0)
+        .expect("the middle is known")
+        .point;
+    let intrinsics = Intrinsics {
+        fx: 900.0,
+        fy: 900.0,
+        cx: 639.5,
+        cy: 479.5,
+    };
+    let camera = Camera {
+        name: "mast".into(),
+        width: 1280,
+        height: 960,
+        lens: Lens::Pinhole(Pinhole::new(intrinsics).expect("a lens")),
+        mount: Mount::new(Vector::new(0.2, 0.0, 1.8), [0.5, -0.5, 0.5, -0.5]).expect("a mount"),
+    };
+    let down = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.26, 0.4);
+    View {
+        image_id: "v".into(),
+        listed: ("poses.csv".into(), 2),
+        time: None,
+        platform: None,
+        picture: None,
+        camera: Some(Arc::new(camera)),
+        head: PanTilt {
+            pan: 0.0,
+            tilt: 0.0,
+        },
+        pose: Pose {
+            enu_from_body: RigidTransform::new(
+                Rotation::from_unit_quaternion(down),
+                ground - Point::<Enu>::origin(),
+            ),
+            sigma: PoseSigma {
+                east_m: 0.05,
+                north_m: 0.05,
+                up_m: 0.02,
+                roll: 0.004,
+                pitch: 0.004,
+                yaw: 0.007,
+            },
+            has_heading: true,
+        },
+        enu_from_local: site().enu_from_local(site().origin()),
+    }
+}
+
+/// Boxes spread over the picture's lower two thirds.
+fn boxes() -> Vec<Detection> {
+    let one = |i: u32| {
+        let share = |step: f64| (f64::from(i) * step).fract();
+        let (u, v) = (1240.0 * share(0.618_034), 340.0 + 580.0 * share(0.754_878));
+        Detection {
+            image_id: "v".into(),
+            det_id: i.to_string(),
+            class: None,
+            score: Some(0.8),
+            diameter_m: None,
+            mark: Mark::Box(PixelBox {
+                x_min: u,
+                y_min: v,
+                x_max: u + 30.0,
+                y_max: v + 24.0,
+            }),
+            range_m: None,
+            sigma: MarkSigma::default(),
+            file: 0,
+            line: u64::from(i) + 2,
+        }
+    };
+    (0..RAYS).map(one).collect()
+}
+
+fn projected_boxes(c: &mut Criterion) {
+    let plane = Terrain::constant_height(site(), 115.0);
+    let model = model();
+    let settings = Settings {
+        aim: Aim::CENTER,
+        min_range_m: 0.0,
+        max_range_m: 60.0,
+        min_score: 0.0,
+        noise: MarkNoise {
+            pixel_px: 1.5,
+            range_m: 0.15,
+            bearing: 0.02,
+        },
+    };
+    let boxes = boxes();
+    let mut group = c.benchmark_group("project");
+    group.throughput(Throughput::Elements(u64::from(RAYS)));
+    for (name, terrain) in [("boxes, constant height", &plane), ("boxes, model", &model)] {
+        let view = view(terrain);
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                let place = |d| project::place(d, (0, &view), Some(terrain), 0.02, &settings);
+                boxes
+                    .iter()
+                    .filter(|&d| place(black_box(d)).is_ok())
+                    .count()
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, first_hits, projected_boxes);
 criterion_main!(benches);

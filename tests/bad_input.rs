@@ -309,6 +309,64 @@ fn an_unknown_key() {
 }
 
 #[test]
+fn norths_heights_and_bodies_that_do_not_serve() {
+    let set = |assignments: &[&str], expected: &[&str]| {
+        let arguments: Vec<&str> = assignments.iter().flat_map(|&a| ["--set", a]).collect();
+        refused(&Case::new(), &arguments, expected);
+    };
+    set(
+        &["site.north=\"grid\""],
+        &[
+            "error: --set: site.north: found \"grid\" without site.crs, expected site.crs, a map whose \
+             north it is",
+        ],
+    );
+    set(
+        &["site.north=\"grid\"", "site.crs=\"EPSG:4326\""],
+        &[
+            "error: --set: site.north: found \"grid\" with EPSG:4326, which is no map, expected a \
+             projected site.crs, such as EPSG:32719",
+        ],
+    );
+    set(
+        &["site.north=\"magnetic\""],
+        &[
+            "error: --set: site.north: found \"magnetic\" without a declination, expected \
+             site.declination_deg, the azimuth of magnetic north",
+        ],
+    );
+    set(
+        &["site.declination_deg=3.5"],
+        &[
+            "error: --set: site.declination_deg: found a declination, and headings that are not \
+             magnetic, expected site.north = \"magnetic\"",
+        ],
+    );
+    set(
+        &["site.height=\"EPSG:32632\""],
+        &[
+            "error: --set: site.height: found \"EPSG:32632\", expected a vertical coordinate reference \
+             system known to PROJ, such as EPSG:5773, or a geoid grid in GTX format (not a vertical \
+             one)",
+        ],
+    );
+    set(
+        &["site.body=\"mars\"", "site.height=\"EPSG:5773\""],
+        &[
+            "error: --set: site.height: found \"EPSG:5773\", expected one that PROJ can turn into \
+             heights above the ellipsoid here",
+        ],
+    );
+    set(
+        &["site.body=\"IAU_2015:49910\""],
+        &[
+            "error: --set: site.body: found \"IAU_2015:49910\", expected earth, moon, mars, or the \
+             code of a geographic CRS by the IAU, such as IAU_2015:49900",
+        ],
+    );
+}
+
+#[test]
 fn methods_and_formats_that_are_not_there_yet() {
     refused(
         &Case::new(),

@@ -141,6 +141,10 @@ impl Scene {
                     range: None,
                 },
                 log_size: Some(log_size),
+                box_px: None,
+                is_cut: false,
+                class: 0,
+                score: None,
             })
             .collect()
     }
@@ -365,6 +369,10 @@ fn derivatives_agree_with_differences() {
             view: 0,
             reading,
             log_size: None,
+            box_px: None,
+            is_cut: false,
+            class: 0,
+            score: None,
         };
         let problem = problem(&views, &[], &plane, 0.1);
         let residual = |point: Vector3<f64>, delta: Vector6<f64>| {

@@ -68,7 +68,11 @@ pub fn map_from_bytes(bytes: &[u8], shown: &str) -> Result<RockMap, Error> {
     let mut estimates = Vec::with_capacity(features.len());
     let mut faults = Vec::new();
     for (index, feature) in features.iter().enumerate() {
-        let reader = FeatureReader { shown, index };
+        let reader = FeatureReader {
+            shown,
+            index,
+            planet,
+        };
         match reader.estimate(feature) {
             Ok(estimate) => estimates.push(estimate),
             Err(fault) => faults.push(fault),
@@ -86,6 +90,7 @@ pub fn map_from_bytes(bytes: &[u8], shown: &str) -> Result<RockMap, Error> {
 struct FeatureReader<'a> {
     shown: &'a str,
     index: usize,
+    planet: Planet,
 }
 
 impl FeatureReader<'_> {
@@ -145,7 +150,7 @@ impl FeatureReader<'_> {
             let expected = "longitude and latitude in degrees";
             return Err(self.fault("geometry.coordinates", pair, expected));
         }
-        Ok(Geodetic::from_degrees(lat_deg, lon_deg, 0.0))
+        Ok(self.planet.eastward().place(lat_deg, lon_deg, 0.0))
     }
 }
 

@@ -40,6 +40,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::error::{Error, Fault, Place};
+use crate::frame::{Geodetic, Planet};
 
 /// What counts, and how far is too far.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -131,6 +132,22 @@ pub struct Truth {
     pub ignored: Vec<IgnoredPlace>,
 }
 
+impl Truth {
+    /// With latitudes and longitudes understood as the planet's files have them.
+    fn on(mut self, planet: Planet) -> Self {
+        let read = |p: Geodetic| planet.place(p.lat.to_degrees(), p.lon.to_degrees(), p.height_m);
+        if !planet.is_plain() {
+            for object in &mut self.objects {
+                object.place = read(object.place);
+            }
+            for ignored in &mut self.ignored {
+                ignored.place = read(ignored.place);
+            }
+        }
+        self
+    }
+}
+
 /// A map held against the truth.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
@@ -155,7 +172,7 @@ pub fn evaluate(sources: &Sources, options: &Options) -> Result<Evaluation, Erro
         Some(path) => read_ignored(path, &shown(path))?,
         None => Vec::new(),
     };
-    let truth = Truth { objects, ignored };
+    let truth = Truth { objects, ignored }.on(map.planet);
     let comparison = Comparison::new(&map, &truth, options)?;
     let mut report = Report::new(&comparison);
     if let Some(path) = &sources.labels {

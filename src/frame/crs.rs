@@ -2,11 +2,13 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::f64::consts::PI;
 use std::rc::Rc;
 
 use proj::Proj;
 
-use super::Planet;
+use super::definition::Definition;
+use super::{Ellipsoid, Geodetic, Planet};
 
 /// A two-dimensional coordinate reference system known to PROJ, over a planet's geographic one.
 ///
@@ -15,7 +17,19 @@ use super::Planet;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Crs {
     definition: String,
+    /// What PROJ is asked for.
+    asked: String,
     geographic: &'static str,
+    planet: Ellipsoid,
+    /// Its own latitudes are geodetic on an ellipsoid of this flattening; `None` where they are the
+    /// planet's.
+    own_flattening: Option<f64>,
+    is_projected: bool,
+    /// Its longitudes grow westwards. PROJ does not put such axes in order, nor planetocentric ones,
+    /// and is asked for geodetic latitudes and eastward longitudes instead.
+    is_westward: bool,
+    /// Its latitudes are planetocentric, on an ellipsoid of this flattening.
+    ocentric: Option<f64>,
     /// What this thread's converter is kept under.
     key: String,
 }
@@ -55,13 +69,68 @@ impl Crs {
     /// # Errors
     /// [`CrsError::Unknown`] where PROJ cannot relate it to the planet's geographic CRS.
     pub fn new(definition: &str, planet: Planet) -> Result<Self, CrsError> {
+        let parts = Definition::of(definition)?;
+        // On other bodies maps on a sphere and on an ellipsoid stand side by side, and PROJ takes the
+        // latitude of the one for that of the other. On Earth it knows the ways between datums.
+        let flattening = parts.ellipsoid().map(|ellipsoid| ellipsoid.f);
+        let own =
+            flattening.filter(|f| !planet.is_earth() && (f - planet.ellipsoid.f).abs() > 1e-7);
+        let is_westward = parts.is_geodetic() && parts.is_west_positive();
+        let is_ocentric = parts.is_geodetic() && parts.is_ocentric();
+        let ocentric = flattening.filter(|_| is_ocentric);
+        let asked = match parts.ellipsoid().filter(|_| is_westward || is_ocentric) {
+            Some(Ellipsoid { a, f }) => {
+                format!(
+                    "+proj=longlat +a={a} +b={} +no_defs +type=crs",
+                    a * (1.0 - f)
+                )
+            }
+            None => definition.to_owned(),
+        };
         let crs = Self {
             definition: definition.to_owned(),
-            geographic: planet.crs,
-            key: format!("{} {definition}", planet.crs),
+            geographic: planet.longlat,
+            planet: planet.ellipsoid,
+            own_flattening: own,
+            is_projected: parts.is_projected(),
+            is_westward,
+            ocentric,
+            key: format!("{} {asked}", planet.longlat),
+            asked,
         };
         crs.converter()?;
         Ok(crs)
+    }
+
+    /// Whether a definition is one that PROJ understands, on whatever planet.
+    ///
+    /// # Errors
+    /// [`CrsError::Unknown`] where it is not.
+    pub fn check(definition: &str) -> Result<(), CrsError> {
+        Definition::of(definition).map(|_| ())
+    }
+
+    /// Whether its coordinates are on a map, rather than longitudes and latitudes.
+    pub fn is_projected(&self) -> bool {
+        self.is_projected
+    }
+
+    /// The meridian convergence at a place: the azimuth of grid north, the way of growing northings,
+    /// radians clockwise from true north. It is positive where grid north lies east of true north.
+    ///
+    /// # Errors
+    /// [`CrsError::OutsideDomain`] where the projection does not reach.
+    pub fn convergence(&self, place: Geodetic) -> Result<f64, CrsError> {
+        // Long enough for rounding, short enough for the map's own bend, which cancels.
+        const STEP: f64 = 1.0;
+        let (x, y) = self.xy(place.lon, place.lat)?;
+        let ((lon_0, lat_0), (lon_1, lat_1)) =
+            (self.lon_lat(x, y - STEP)?, self.lon_lat(x, y + STEP)?);
+        let lon = (lon_1 - lon_0 + PI).rem_euclid(2.0 * PI) - PI;
+        let [across, meridian] = self.planet.radii(place.lat);
+        let east_m = lon * across * place.lat.cos();
+        let north_m = (lat_1 - lat_0) * meridian;
+        Ok(east_m.atan2(north_m))
     }
 
     /// The definition it was made from.
@@ -75,10 +144,14 @@ impl Crs {
     /// [`CrsError::OutsideDomain`] where the projection has no such place.
     pub fn lon_lat(&self, x: f64, y: f64) -> Result<(f64, f64), CrsError> {
         let outside = || self.outside(x, y);
+        let (east, north) = self.turned(x, y, |lat, f| geodetic_latitude(lat, 0.0, f));
         let (lon, lat) = self
             .converter()?
-            .project((x, y), true)
+            .project((east, north), true)
             .map_err(|_| outside())?;
+        let lat = self
+            .own_flattening
+            .map_or(lat, |own| geodetic_latitude(lat, own, self.planet.f));
         finite(lon, lat).ok_or_else(outside)
     }
 
@@ -88,11 +161,24 @@ impl Crs {
     /// [`CrsError::OutsideDomain`] where the projection does not reach.
     pub fn xy(&self, lon: f64, lat: f64) -> Result<(f64, f64), CrsError> {
         let outside = || self.outside(lon.to_degrees(), lat.to_degrees());
+        let lat = self
+            .own_flattening
+            .map_or(lat, |own| geodetic_latitude(lat, self.planet.f, own));
         let (x, y) = self
             .converter()?
             .project((lon, lat), false)
             .map_err(|_| outside())?;
+        let (x, y) = self.turned(x, y, |lat, f| geodetic_latitude(lat, f, 0.0));
         finite(x, y).ok_or_else(outside)
+    }
+
+    /// Degrees between the axes of this CRS and those PROJ is asked for.
+    fn turned(&self, x: f64, y: f64, latitude: impl Fn(f64, f64) -> f64) -> (f64, f64) {
+        let x = if self.is_westward { -x } else { x };
+        let y = self
+            .ocentric
+            .map_or(y, |f| latitude(y.to_radians(), f).to_degrees());
+        (x, y)
     }
 
     fn outside(&self, x: f64, y: f64) -> CrsError {
@@ -109,7 +195,7 @@ impl Crs {
                 return Ok(Converter(Rc::clone(found)));
             }
             let made =
-                Proj::new_known_crs(self.geographic, &self.definition, None).map_err(|error| {
+                Proj::new_known_crs(self.geographic, &self.asked, None).map_err(|error| {
                     CrsError::Unknown {
                         found: self.definition.clone(),
                         why: error.to_string(),
@@ -136,6 +222,12 @@ impl Converter {
         self.0
             .project((point.0.to_degrees(), point.1.to_degrees()), false)
     }
+}
+
+/// The geodetic latitude on the ellipsoid of another flattening that has the same angle at the centre.
+fn geodetic_latitude(lat: f64, from: f64, to: f64) -> f64 {
+    let (sin, cos) = lat.sin_cos();
+    (sin * (1.0 - from).powi(2)).atan2(cos * (1.0 - to).powi(2))
 }
 
 fn finite(x: f64, y: f64) -> Option<(f64, f64)> {
@@ -169,6 +261,48 @@ mod tests {
         let crs = Crs::new("IAU_2015:49910", Planet::MARS).unwrap();
         let (x, _) = crs.xy(0.01, 0.0).unwrap();
         assert!((x - 33_961.9).abs() < 1e-3);
+    }
+
+    /// A map on a sphere has planetocentric latitudes, whatever the run's ellipsoid is.
+    #[test]
+    fn maps_on_a_sphere_and_on_an_ellipsoid_agree_on_places() {
+        let planet = Planet::named("IAU_2015:49901").unwrap();
+        let sphere = Crs::new("IAU_2015:49910", planet).unwrap();
+        let (lat_c, _) = Planet::named("IAU_2015:49902")
+            .unwrap()
+            .lat_lon_deg(planet.place(20.0, -77.0, 0.0));
+        let place = planet.place(20.0, -77.0, 0.0);
+        let (x, y) = sphere.xy(place.lon, place.lat).unwrap();
+        assert!((x - 77f64.to_radians() * 3_396_190.0).abs() < 1e-6);
+        assert!((y - lat_c.to_radians() * 3_396_190.0).abs() < 1e-6);
+        let (lon, lat) = sphere.lon_lat(x, y).unwrap();
+        assert!((lon - place.lon).abs() < 1e-14 && (lat - place.lat).abs() < 1e-14);
+    }
+
+    /// On a sphere `tan c = tan(lon) sin(lat)` (Snyder 1987, eq. 8-9).
+    #[test]
+    fn convergence_of_a_transverse_mercator() {
+        let crs = Crs::new("+proj=tmerc +R=3396190 +lon_0=10 +type=crs", Planet::MARS).unwrap();
+        for (lat, lon) in [(60.0, 12.5), (-35.0, 8.0), (0.0, 14.0), (80.0, 10.0)] {
+            let place = Geodetic::from_degrees(lat, lon, 0.0);
+            let expected = ((lon - 10.0).to_radians().tan() * place.lat.sin()).atan();
+            let found = crs.convergence(place).unwrap();
+            assert!(
+                (found - expected).abs() < 1e-8,
+                "{lat} {lon}: {found} {expected}"
+            );
+        }
+    }
+
+    /// On a polar map grid north is a longitude's distance from true north.
+    #[test]
+    fn convergence_near_a_pole() {
+        let crs = Crs::new("IAU_2015:30135", Planet::MOON).unwrap();
+        for lon in [-170.0, -90.0, 0.0, 30.0, 120.0] {
+            let place = Geodetic::from_degrees(-89.0, lon, 0.0);
+            let turn = crs.convergence(place).unwrap() + f64::to_radians(lon);
+            assert!(turn.sin().abs() < 1e-8 && turn.cos() > 0.0, "{lon}: {turn}");
+        }
     }
 
     #[test]

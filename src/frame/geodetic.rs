@@ -67,6 +67,14 @@ impl Ellipsoid {
         self.f * (2.0 - self.f)
     }
 
+    /// Radii of curvature at a latitude, metres: across the meridian and along it (Snyder 1987,
+    /// eqs. 4-18 to 4-20).
+    pub fn radii(&self, lat: f64) -> [f64; 2] {
+        let w2 = 1.0 - self.e2() * lat.sin().powi(2);
+        let across = self.a / w2.sqrt();
+        [across, across * (1.0 - self.e2()) / w2]
+    }
+
     /// Planet-centred place of a geodetic one; closed form.
     pub fn to_ecef(&self, g: Geodetic) -> Point<Ecef> {
         let (sin_lat, cos_lat) = g.lat.sin_cos();
@@ -116,56 +124,10 @@ fn unit(s: f64, c: f64) -> (f64, f64) {
     }
 }
 
-/// A planet or moon: its ellipsoid and the coordinate reference system its maps are in.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Planet {
-    /// Lower-case English name, as `[site] body` gives it.
-    pub name: &'static str,
-    /// Its ellipsoid.
-    pub ellipsoid: Ellipsoid,
-    /// Authority and code of its geographic CRS, as PROJ knows it.
-    pub crs: &'static str,
-}
-
-impl Planet {
-    /// Earth, WGS84.
-    pub const EARTH: Self = Self {
-        name: "earth",
-        ellipsoid: Ellipsoid::WGS84,
-        crs: "EPSG:4326",
-    };
-    /// The Moon: sphere of the IAU 2015 report, planetocentric latitude, east positive.
-    pub const MOON: Self = Self {
-        name: "moon",
-        ellipsoid: Ellipsoid::sphere(1_737_400.0),
-        crs: "IAU_2015:30100",
-    };
-    /// Mars: sphere of the IAU 2015 report, planetocentric latitude, east positive.
-    pub const MARS: Self = Self {
-        name: "mars",
-        ellipsoid: Ellipsoid::sphere(3_396_190.0),
-        crs: "IAU_2015:49900",
-    };
-
-    /// All planets known by name.
-    pub const ALL: [Self; 3] = [Self::EARTH, Self::MOON, Self::MARS];
-
-    /// The planet of a name (`earth`, `moon`, `mars`) or of its CRS code.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|p| p.name.eq_ignore_ascii_case(name) || p.crs.eq_ignore_ascii_case(name))
-    }
-
-    /// Whether this is Earth, whose maps are WGS84.
-    pub fn is_earth(&self) -> bool {
-        self.name == "earth"
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::Planet;
 
     #[test]
     fn round_trip_at_all_latitudes_and_heights() {
@@ -181,12 +143,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn planets_are_found_by_name_and_code() {
-        assert_eq!(Planet::named("Mars"), Some(Planet::MARS));
-        assert_eq!(Planet::named("IAU_2015:30100"), Some(Planet::MOON));
-        assert_eq!(Planet::named("pluto"), None);
     }
 }

@@ -25,17 +25,27 @@
 mod axes;
 mod covariance;
 mod crs;
+mod definition;
 mod geodetic;
 mod pixel;
+mod planet;
 mod point;
+#[allow(
+    unsafe_code,
+    reason = "PROJ's three-dimensional transformations have no safe binding; this is the one file that calls it"
+)]
+mod proj_3d;
 mod site;
 mod transform;
+mod vertical;
 
 pub use axes::{Body, Camera, Ecef, Enu, LocalEnu};
 pub use covariance::{Ellipse, covariance_ellipse};
 pub use crs::{Crs, CrsError};
-pub use geodetic::{Ellipsoid, Geodetic, Planet};
+pub use geodetic::{Ellipsoid, Geodetic};
 pub use pixel::Pixel;
+pub use planet::Planet;
 pub use point::{Direction, Point, Ray, Vector};
 pub use site::Site;
 pub use transform::{RigidTransform, Rotation, skew};
+pub use vertical::{DatumError, GeoidGrid, VerticalDatum};

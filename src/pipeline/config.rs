@@ -7,10 +7,10 @@ use serde::Serialize;
 use super::paths::{Paths, Source};
 use crate::detection::Aim;
 use crate::error::{Error, Fault};
-use crate::frame::{Crs, Geodetic, Planet};
+use crate::frame::{Crs, Geodetic, Planet, VerticalDatum};
 use crate::fuse::belief::{PoseCorrection, SizeRule};
 use crate::input::{Document, Section};
-use crate::pose::PoseSigma;
+use crate::pose::{HeadingReference, North, PoseSigma};
 
 /// A checked pipeline file.
 #[derive(Debug, Clone, Serialize)]
@@ -45,6 +45,34 @@ pub struct SiteConfig {
     /// The planet.
     #[serde(rename = "body", serialize_with = "super::paths::planet")]
     pub planet: Planet,
+    /// What heights are above, where it is not the ellipsoid.
+    pub height: Option<Heights>,
+    /// The north that headings of pose logs count from.
+    pub north: NorthName,
+    /// Azimuth of magnetic north, degrees.
+    pub declination_deg: Option<f64>,
+}
+
+/// What heights are above.
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+pub enum Heights {
+    /// The zero of a vertical CRS, by its code.
+    Crs(String),
+    /// The geoid of a grid file.
+    Grid(Source),
+}
+
+/// The north that headings count from, as the pipeline file names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum NorthName {
+    /// True north.
+    True,
+    /// The grid north of the site's CRS.
+    Grid,
+    /// Magnetic north.
+    Magnetic,
 }
 
 /// `[input]`: the files.
@@ -62,6 +90,10 @@ pub struct InputConfig {
     pub detections: Vec<Source>,
     /// The largest share of faulty records at which a run still counts as clean.
     pub max_reject_share: f64,
+    /// Degrees clockwise to be added to every heading of the pose logs.
+    pub heading_bias_deg: f64,
+    /// What the clock of the pose logs shows more than that of the images, seconds.
+    pub clock_offset_s: f64,
 }
 
 /// `[terrain]`: the ground.
@@ -216,9 +248,9 @@ impl Config {
     }
 
     fn sections(root: &Section<'_>, path: &Path, overrides: &Overrides) -> Option<Self> {
-        let site = site(root.section("site"), path);
         let input = root.section("input");
         let paths = Paths::new(&input, path, overrides);
+        let site = site(root.section("site"), path, &paths);
         let input = inputs(input, &paths);
         let terrain = terrain(root.section("terrain"), &paths);
         let view = view(root.section("view"));
@@ -251,15 +283,15 @@ fn not_negative(section: &Section<'_>, key: &str, default: f64) -> f64 {
     section.number(key, 0.0.., NOT_NEGATIVE).unwrap_or(default)
 }
 
-fn site(section: Section<'_>, path: &Path) -> Option<SiteConfig> {
+fn site(section: Section<'_>, path: &Path, paths: &Paths) -> Option<SiteConfig> {
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     let planet = match section.text("body") {
         None => Some(Planet::EARTH),
         Some(name) => {
             let planet = Planet::named(&name);
             if planet.is_none() {
-                let known = "earth, moon (IAU_2015:30100) or mars (IAU_2015:49900); \
-                             other bodies are not there yet";
+                let known = "earth, moon, mars, or the code of a geographic CRS by the IAU, such as \
+                             IAU_2015:49900";
                 section.fault("body", format!("{name:?}"), known);
             }
             planet
@@ -269,23 +301,90 @@ fn site(section: Section<'_>, path: &Path) -> Option<SiteConfig> {
         let crs = Crs::new(&text, planet);
         crs.map_err(|e| section.problem("crs", e.to_string())).ok()
     });
-    if let Some(height) = section.text("height") {
-        let expected = "no such key: vertical CRSs are not there yet, heights are ellipsoidal";
-        section.fault("height", format!("{height:?}"), expected);
-    }
-    let origin = origin(section.section("origin"));
+    let height = heights(&section, paths, planet);
+    let (north, declination_deg) = north(&section, crs.as_ref());
+    let origin = origin(section.section("origin"), planet.unwrap_or(Planet::EARTH));
     let name = section.text("name").or(stem).unwrap_or_default();
     let config = planet.map(|planet| SiteConfig {
         name,
         origin,
         crs,
         planet,
+        height,
+        north,
+        declination_deg,
     });
     section.finish();
     config
 }
 
-fn origin(section: Section<'_>) -> Option<Geodetic> {
+/// The vertical CRS of heights. Which grids it takes shows only where the site is known.
+fn heights(section: &Section<'_>, paths: &Paths, planet: Option<Planet>) -> Option<Heights> {
+    let text = section.text("height")?;
+    if text.to_ascii_lowercase().ends_with(".gtx") {
+        let grids = paths.sources(section, "height")?;
+        return grids.into_iter().next().map(Heights::Grid);
+    }
+    match VerticalDatum::check(&text, planet?) {
+        Ok(()) => Some(Heights::Crs(text)),
+        Err(error) => {
+            section.problem("height", error.to_string());
+            None
+        }
+    }
+}
+
+/// The north of headings, and the declination where it is magnetic.
+fn north(section: &Section<'_>, crs: Option<&Crs>) -> (NorthName, Option<f64>) {
+    let word = section.word("north", &["true", "grid", "magnetic"]);
+    let declination = section.number("declination_deg", -180.0..=180.0, "-180 to 180");
+    let north = match word.as_deref() {
+        Some("grid") => NorthName::Grid,
+        Some("magnetic") => NorthName::Magnetic,
+        _ => NorthName::True,
+    };
+    if north == NorthName::Grid && !section.has("crs") {
+        let expected = "site.crs, a map whose north it is";
+        section.fault("north", "\"grid\" without site.crs", expected);
+    }
+    if let (NorthName::Grid, Some(crs)) = (north, crs)
+        && !crs.is_projected()
+    {
+        let found = format!("\"grid\" with {}, which is no map", crs.definition());
+        section.fault("north", found, "a projected site.crs, such as EPSG:32719");
+    }
+    match (north, section.has("declination_deg")) {
+        (NorthName::Magnetic, false) => {
+            let expected = "site.declination_deg, the azimuth of magnetic north";
+            section.fault("north", "\"magnetic\" without a declination", expected);
+        }
+        (NorthName::True | NorthName::Grid, true) => {
+            let found = "a declination, and headings that are not magnetic";
+            section.fault("declination_deg", found, "site.north = \"magnetic\"");
+        }
+        _ => {}
+    }
+    (north, declination)
+}
+
+impl Config {
+    /// What headings of the pose logs are measured from.
+    pub fn heading(&self) -> HeadingReference {
+        let declination = self.site.declination_deg.unwrap_or(0.0).to_radians();
+        let north = match (self.site.north, &self.site.crs) {
+            (NorthName::Grid, Some(crs)) => North::Grid(crs.clone()),
+            (NorthName::Magnetic, _) => North::Magnetic { declination },
+            _ => North::True,
+        };
+        HeadingReference {
+            north,
+            bias: self.input.heading_bias_deg.to_radians(),
+        }
+    }
+}
+
+/// The origin's height is as the run's heights are.
+fn origin(section: Section<'_>, planet: Planet) -> Option<Geodetic> {
     if !section.is_present() {
         return None;
     }
@@ -298,7 +397,7 @@ fn origin(section: Section<'_>) -> Option<Geodetic> {
     }
     let height_m = section.number("height_m", .., "a number").unwrap_or(0.0);
     section.finish();
-    Some(Geodetic::from_degrees(lat?, lon?, height_m))
+    Some(planet.place(lat?, lon?, height_m))
 }
 
 fn inputs(section: Section<'_>, paths: &Paths) -> Option<InputConfig> {
@@ -318,6 +417,12 @@ fn inputs(section: Section<'_>, paths: &Paths) -> Option<InputConfig> {
         max_reject_share: section
             .number("max_reject_share", 0.0..=1.0, "0 to 1")
             .unwrap_or(0.1),
+        heading_bias_deg: section
+            .number("heading_bias_deg", -360.0..=360.0, "-360 to 360")
+            .unwrap_or(0.0),
+        clock_offset_s: section
+            .number("clock_offset_s", -1e9..=1e9, "seconds, up to a billion")
+            .unwrap_or(0.0),
         poses: poses.unwrap_or_default(),
         detections: detections.unwrap_or_default(),
     };

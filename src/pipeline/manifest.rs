@@ -7,6 +7,7 @@ use super::config::Config;
 use super::digest::hexadecimal;
 use super::read::Inputs;
 use super::summary::{Stage, Summary};
+use crate::frame::VerticalDatum;
 use crate::fuse::Fusion;
 
 /// The program's version, part of what a run is.
@@ -34,6 +35,8 @@ pub(super) fn run_json(
     summary: &Summary,
 ) -> String {
     let origin = inputs.site.origin();
+    let (lat_deg, lon_deg) = inputs.site.planet().lat_lon_deg(origin);
+    let datum = inputs.datum.as_ref();
     let manifest = json!({
         "run_id": run_id,
         "program": "rockmap",
@@ -42,10 +45,11 @@ pub(super) fn run_json(
             "body": inputs.site.planet().name,
             "crs": inputs.site.planet().crs,
             "origin": {
-                "lat_deg": origin.lat_deg(),
-                "lon_deg": origin.lon_deg(),
+                "lat_deg": lat_deg,
+                "lon_deg": lon_deg,
                 "height_m": origin.height_m,
             },
+            "heights": datum.map_or("ellipsoid", VerticalDatum::name),
         },
         "config": config,
         "inputs": inputs.files,

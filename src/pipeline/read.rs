@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use super::Observer;
 use super::checks::cross_checks;
-use super::config::Config;
+use super::config::{Config, Heights};
 use super::digest::{InputFile, digest};
 use super::paths::Source;
 use super::pictures::PictureDigest;
 use crate::camera::{Camera, read_cameras};
 use crate::detection::{Detection, DetectionFile, read_detections};
 use crate::error::{Error, Fault, Place};
-use crate::frame::{Geodetic, Site};
+use crate::frame::{DatumError, Geodetic, Site, VerticalDatum};
 use crate::input::{Reason, Reject};
 use crate::pose::{PoseFile, read_poses};
 use crate::terrain::Terrain;
@@ -23,6 +23,8 @@ use crate::view::{self, ImageFile, Sources, View, read_images};
 pub struct Inputs {
     /// The site.
     pub site: Site,
+    /// What heights of the inputs and of the map are above, where it is not the ellipsoid.
+    pub datum: Option<VerticalDatum>,
     /// The ground; `None` where the run names none and every detection has a range.
     pub terrain: Option<Terrain>,
     /// The views, in the order of acquisition.
@@ -53,20 +55,26 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
     let mut faults = Faults::default();
     let crs = config.site.crs.as_ref();
     let input = &config.input;
-    let poses = faults.read_all(&input.poses, |s, _| read_poses(&s.path, &s.shown, crs));
+    let planet = config.site.planet;
+    let mut poses = faults.read_all(&input.poses, |s, _| {
+        read_poses(&s.path, &s.shown, planet, crs)
+    });
     let is_log = poses.iter().any(|(_, _, p)| !p.is_per_image);
     let images = faults.read_all(&input.images, |s, _| read_images(&s.path, &s.shown, is_log));
     let cameras = faults.read_all(&input.cameras, |s, _| read_cameras(&s.path, &s.shown));
     let detections = faults.read_all(&input.detections, |s, i| {
         read_detections(&s.path, &s.shown, i)
     });
-    let site = site(config, &poses, &mut faults);
-    let terrain = terrain(config, site, &mut faults);
+    let datum = datum(config, &poses, &mut faults);
+    let origin = origin(config, &mut poses, datum.as_ref(), &mut faults);
+    let site = site(config, origin, &poses, &mut faults);
+    let terrain = terrain(config, site, datum.as_ref(), &mut faults);
     cross_checks(config, &poses, &detections, &mut faults);
     let cameras = all_cameras(cameras, &mut faults);
     faults.none()?;
 
-    let files = input_files(config, &poses, &images, &detections)?;
+    let mut files = input_files(config, &poses, &images, &detections)?;
+    files.extend(geoid_files(datum.as_ref(), terrain.as_ref())?);
     let mut assembly = view::assemble(&Sources {
         poses: &poses,
         images: &images,
@@ -74,9 +82,11 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
         site: &site,
         pose_sigma: config.noise.pose,
         max_gap_s: config.view.max_gap_s,
+        clock_offset_s: input.clock_offset_s,
     });
     let mut inputs = Inputs {
         site,
+        datum,
         terrain,
         views: std::mem::take(&mut assembly.views),
         detections: Vec::new(),
@@ -135,6 +145,29 @@ fn input_files(
     Ok(files)
 }
 
+/// The grids that heights are shifted by, each once.
+fn geoid_files(
+    datum: Option<&VerticalDatum>,
+    terrain: Option<&Terrain>,
+) -> Result<Vec<InputFile>, Error> {
+    let own = datum.map_or(&[][..], VerticalDatum::grids);
+    let grids = own
+        .iter()
+        .chain(terrain.map_or(&[][..], Terrain::geoid_grids));
+    let mut files = Vec::new();
+    let mut seen = HashSet::new();
+    for grid in grids {
+        if seen.insert(&grid.path) {
+            let source = Source {
+                path: grid.path.clone(),
+                shown: grid.name.clone(),
+            };
+            files.push(digest("geoid", &source, None)?);
+        }
+    }
+    Ok(files)
+}
+
 /// Faults of all inputs, so that they are told together.
 #[derive(Default)]
 pub(super) struct Faults {
@@ -175,12 +208,58 @@ impl Faults {
     }
 }
 
-/// The site of a run: its named origin, or the first pose.
-fn site(config: &Config, poses: &[Read<PoseFile>], faults: &mut Faults) -> Site {
-    let first = || {
-        let rows = poses.iter().flat_map(|(_, _, file)| &file.rows);
-        rows.into_iter().find_map(crate::pose::PoseRow::geodetic)
+/// The first pose that has a place on the planet.
+fn first_place(poses: &[Read<PoseFile>]) -> Option<Geodetic> {
+    let mut rows = poses.iter().flat_map(|(_, _, file)| &file.rows);
+    rows.find_map(crate::pose::PoseRow::geodetic)
+}
+
+/// What heights are above, around the run's origin; `None` for the ellipsoid.
+fn datum(config: &Config, poses: &[Read<PoseFile>], faults: &mut Faults) -> Option<VerticalDatum> {
+    let around = config.site.origin.or_else(|| first_place(poses))?;
+    let datum = match config.site.height.as_ref()? {
+        Heights::Crs(code) => VerticalDatum::new(code, config.site.planet, around),
+        Heights::Grid(grid) => VerticalDatum::from_grid(&grid.path, &grid.shown, around),
     };
+    let told = |error: &_| Fault::new(Place::default(), "site.height", format!("{error}"));
+    datum
+        .map_err(|error: DatumError| faults.faults.push(told(&error)))
+        .ok()
+}
+
+/// The origin that the run names, with its height above the ellipsoid; on the way all poses are put
+/// into true north and ellipsoidal heights.
+fn origin(
+    config: &Config,
+    poses: &mut [Read<PoseFile>],
+    datum: Option<&VerticalDatum>,
+    faults: &mut Faults,
+) -> Option<Geodetic> {
+    let origin = match (config.site.origin, datum) {
+        (Some(origin), Some(datum)) => match datum.to_ellipsoidal(origin) {
+            Ok(origin) => Some(origin),
+            Err(error) => {
+                let fault = Fault::new(Place::default(), "site.origin", error.to_string());
+                faults.faults.push(fault);
+                Some(origin)
+            }
+        },
+        (origin, _) => origin,
+    };
+    let heading = config.heading();
+    for (_, shown, file) in poses {
+        file.refer(shown, &heading, datum, origin);
+    }
+    origin
+}
+
+/// The site of a run: its named origin, or the first pose.
+fn site(
+    config: &Config,
+    origin: Option<Geodetic>,
+    poses: &[Read<PoseFile>],
+    faults: &mut Faults,
+) -> Site {
     if config.site.origin.is_none()
         && let Some((_, shown, _)) = poses.iter().find(|(_, _, file)| file.is_local)
     {
@@ -191,22 +270,42 @@ fn site(config: &Config, poses: &[Read<PoseFile>], faults: &mut Faults) -> Site 
             "the run to name it: [site] origin = { lat_deg = ..., lon_deg = ..., height_m = ... }",
         ));
     }
-    let origin = config.site.origin.or_else(first);
+    let origin = origin.or_else(|| first_place(poses));
     let nowhere = Geodetic::from_degrees(0.0, 0.0, 0.0);
     Site::new(config.site.planet, origin.unwrap_or(nowhere))
 }
 
-fn terrain(config: &Config, site: Site, faults: &mut Faults) -> Option<Terrain> {
+fn terrain(
+    config: &Config,
+    site: Site,
+    datum: Option<&VerticalDatum>,
+    faults: &mut Faults,
+) -> Option<Terrain> {
     let spec = &config.terrain;
+    // A surface of one height above a geoid is taken for one above the ellipsoid, as at the origin.
+    let plane_m = match (spec.plane_m, datum) {
+        (Some(height_m), Some(datum)) => {
+            let place = Geodetic {
+                height_m,
+                ..site.origin()
+            };
+            let place = datum.to_ellipsoidal(place).map_err(|error| {
+                let fault = Fault::new(Place::default(), "terrain.plane_m", error.to_string());
+                faults.faults.push(fault);
+            });
+            Some(place.ok()?.height_m)
+        }
+        (plane_m, _) => plane_m,
+    };
     if spec.path.is_empty() {
-        return Some(Terrain::constant_height(site, spec.plane_m?));
+        return Some(Terrain::constant_height(site, plane_m?));
     }
     let files: Vec<(PathBuf, String)> = spec
         .path
         .iter()
         .map(|s| (s.path.clone(), s.shown.clone()))
         .collect();
-    match Terrain::open(site, &files, spec.plane_m) {
+    match Terrain::open(site, &files, plane_m, datum) {
         Ok(terrain) => Some(terrain),
         Err(error) => {
             faults.add(error);

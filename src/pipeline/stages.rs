@@ -37,6 +37,7 @@ impl Ground {
     pub fn scene<'a>(&'a self, config: &Config, inputs: &'a Inputs) -> Scene<'a> {
         Scene {
             site: &inputs.site,
+            datum: inputs.datum.as_ref(),
             terrain: inputs.terrain.as_ref(),
             views: self.corrected.as_deref().unwrap_or(&inputs.views),
             measured: self.corrected.as_ref().map(|_| inputs.views.as_slice()),

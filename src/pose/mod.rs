@@ -6,6 +6,7 @@
 
 mod reader;
 mod record;
+mod reference;
 mod time;
 mod track;
 mod writer;
@@ -13,6 +14,7 @@ mod writer;
 pub use reader::{PoseFile, read_poses};
 pub(crate) use reader::{pan_tilt, time};
 pub use record::{Attitude, PoseKey, PoseRow, Position};
+pub use reference::{HeadingReference, North};
 pub use time::Time;
 pub use track::{NoPose, Track};
 pub use writer::{ImageRecord, PoseRecord, format_time, write_images, write_poses};

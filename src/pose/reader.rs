@@ -6,7 +6,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::{Attitude, PoseKey, PoseRow, Position, Time};
 use crate::error::{Error, Fault};
-use crate::frame::{Crs, Geodetic, Point};
+use crate::frame::{Crs, Geodetic, Planet, Point};
 use crate::input::{Reject, Row, Table};
 
 /// What a poses.csv holds.
@@ -71,7 +71,7 @@ const KNOWN: [&str; 29] = [
 /// Which columns give the position.
 #[derive(Clone, Copy, PartialEq)]
 enum Positions<'a> {
-    Geodetic,
+    Geodetic(Planet),
     Grid(&'a Crs),
     Local,
 }
@@ -85,18 +85,25 @@ enum Attitudes {
     None,
 }
 
-/// Reads poses.csv. `crs` is the one easting and northing columns are in, if the run names one.
+/// Reads poses.csv. Latitudes and longitudes are as the planet's files have them; `crs` is the one
+/// easting and northing columns are in, if the run names one. Headings and heights are as logged:
+/// [`PoseFile::refer`] puts them into true north and above the ellipsoid.
 ///
 /// # Errors
 /// A file that cannot be read, a missing column, or a set of columns that is none of the variants;
 /// bad rows are set aside in the result.
-pub fn read_poses(path: &Path, shown: &str, crs: Option<&Crs>) -> Result<PoseFile, Error> {
+pub fn read_poses(
+    path: &Path,
+    shown: &str,
+    planet: Planet,
+    crs: Option<&Crs>,
+) -> Result<PoseFile, Error> {
     let mut table = Table::open(path, shown)?;
     let is_per_image = table.has("image_id");
     if !is_per_image && !table.has("time") {
         return Err(table.missing("time", "a column time or image_id").into());
     }
-    let positions = positions(&table, crs)?;
+    let positions = positions(&table, planet, crs)?;
     let attitudes = attitudes(&table)?;
     let mut file = PoseFile {
         rows: Vec::new(),
@@ -122,10 +129,14 @@ pub fn read_poses(path: &Path, shown: &str, crs: Option<&Crs>) -> Result<PoseFil
     Ok(file)
 }
 
-fn positions<'a>(table: &Table, crs: Option<&'a Crs>) -> Result<Positions<'a>, Fault> {
+fn positions<'a>(
+    table: &Table,
+    planet: Planet,
+    crs: Option<&'a Crs>,
+) -> Result<Positions<'a>, Fault> {
     if table.has("lat_deg") || table.has("lon_deg") {
         table.require(&["lat_deg", "lon_deg"])?;
-        return Ok(Positions::Geodetic);
+        return Ok(Positions::Geodetic(planet));
     }
     if table.has("easting_m") || table.has("northing_m") {
         table.require(&["easting_m", "northing_m"])?;
@@ -213,11 +224,11 @@ pub(crate) fn pan_tilt(row: &Row<'_>) -> Result<[f64; 2], Fault> {
 
 fn position(row: &Row<'_>, positions: Positions<'_>) -> Result<Position, Fault> {
     match positions {
-        Positions::Geodetic => {
+        Positions::Geodetic(planet) => {
             let lat = required_within(row, "lat_deg", -90.0, 90.0)?;
             let lon = required_within(row, "lon_deg", -180.0, 360.0)?;
             let alt = row.number("alt_m")?.unwrap_or(0.0);
-            Ok(Position::Geodetic(Geodetic::from_degrees(lat, lon, alt)))
+            Ok(Position::Geodetic(planet.place(lat, lon, alt)))
         }
         Positions::Grid(crs) => {
             let easting = row.required_number("easting_m")?;

@@ -36,6 +36,16 @@ impl Time {
         span * 1e-9
     }
 
+    /// The instant this many seconds later, to the nanosecond.
+    pub fn later_by(self, seconds: f64) -> Self {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "it saturates, as the addition does"
+        )]
+        let span = (seconds * 1e9).round() as i64;
+        Self::from_nanoseconds(self.nanoseconds.saturating_add(span))
+    }
+
     /// Nanoseconds since 1970.
     pub const fn nanoseconds(self) -> i64 {
         self.nanoseconds
@@ -109,5 +119,7 @@ mod tests {
     fn spans_are_exact() {
         let (a, b) = (Time::parse("-1.5").unwrap(), Time::parse("0.25").unwrap());
         assert_eq!(b.seconds_since(a), 1.75);
+        assert_eq!(a.later_by(1.75), b);
+        assert_eq!(b.later_by(-1.75), a);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use geo::{Coord, MultiPolygon, Orient, Polygon, orient::Direction};
+use geo::{Coord, MapCoords, MultiPolygon, Orient, Polygon, orient::Direction};
 use serde_json::{Map, Value};
 
 use crate::frame::{Geodetic, Planet};
@@ -76,7 +76,7 @@ impl Layer {
                 text,
                 "{{\"type\": \"Feature\", \"id\": {}, \"geometry\": {}, \"properties\": {}}}",
                 Value::from(feature.id),
-                feature.geometry.to_text(multi),
+                feature.geometry.of_files(self.planet).to_text(multi),
                 Value::Object(feature.properties)
             );
         }
@@ -91,6 +91,28 @@ impl Geometry {
             Self::Point(_) => false,
             Self::Lines(lines) => lines.len() > 1,
             Self::Polygons(polygons) => polygons.0.len() > 1,
+        }
+    }
+
+    /// The same with latitudes as the planet's files have them.
+    fn of_files(self, planet: Planet) -> Self {
+        let planet = planet.eastward();
+        if planet.is_plain() {
+            return self;
+        }
+        let at = |at: Coord<f64>| {
+            let (y, x) = planet.lat_lon_deg(Geodetic::from_degrees(at.y, at.x, 0.0));
+            Coord { x, y }
+        };
+        match self {
+            Self::Point(point) => Self::Point(at(point)),
+            Self::Lines(mut lines) => {
+                for point in lines.iter_mut().flatten() {
+                    *point = at(*point);
+                }
+                Self::Lines(lines)
+            }
+            Self::Polygons(polygons) => Self::Polygons(polygons.map_coords(at)),
         }
     }
 

@@ -47,7 +47,7 @@ impl Scene<'_> {
                 "sigma_minor_m": number(rock.ellipse.sigma_minor_m, 4),
                 "sigma_az_deg": degrees(rock.ellipse.azimuth),
                 "diameter_m": optional(rock.diameter_m, 4),
-                "height_m": number(rock.geodetic.height_m, 4),
+                "height_m": optional(self.height_m(rock.geodetic), 4),
                 "score": optional(rock.score, 4),
                 "best_image": best,
                 "first_seen": text(rock.seen.map(|s| s.0)),
@@ -120,7 +120,7 @@ impl Scene<'_> {
                 "image_id": view.image_id,
                 "camera": view.camera_name(),
                 "time": text(view.time),
-                "height_m": number(place.height_m, 4),
+                "height_m": optional(self.height_m(place), 4),
                 "yaw_deg": optional(yaw_deg, 4),
                 "pose_shift_m": Value::Null,
                 "pose_turn_deg": Value::Null,
@@ -190,7 +190,7 @@ impl Scene<'_> {
                 "sigma_minor_m": number(ellipse.sigma_minor_m, 4),
                 "sigma_az_deg": degrees(ellipse.azimuth),
                 "diameter_m": optional(placed.diameter_m, 4),
-                "height_m": number(place.height_m, 4),
+                "height_m": optional(self.height_m(place), 4),
                 "rock_id": rock_of(i),
             });
             layer.add(

@@ -2,7 +2,7 @@
 
 use crate::detection::{Aim, Detection};
 use crate::footprint::Footprints;
-use crate::frame::Site;
+use crate::frame::{Geodetic, Site, VerticalDatum};
 use crate::project::Placed;
 use crate::terrain::Terrain;
 use crate::view::View;
@@ -11,6 +11,8 @@ use crate::view::View;
 pub struct Scene<'a> {
     /// The site.
     pub site: &'a Site,
+    /// What heights of the map are above, where it is not the ellipsoid.
+    pub datum: Option<&'a VerticalDatum>,
     /// The ground.
     pub terrain: Option<&'a Terrain>,
     /// The views.
@@ -27,4 +29,15 @@ pub struct Scene<'a> {
     pub classes: &'a [Option<String>],
     /// The point of a box taken for the object's place.
     pub aim: Aim,
+}
+
+impl Scene<'_> {
+    /// The height of a place as the map gives it, metres: in the run's vertical datum, or above the
+    /// ellipsoid where it names none; `None` outside the datum's grid.
+    pub fn height_m(&self, place: Geodetic) -> Option<f64> {
+        match self.datum {
+            None => Some(place.height_m),
+            Some(datum) => datum.height_m(place).ok(),
+        }
+    }
 }

@@ -121,7 +121,7 @@ mod tests {
         let path = folder.path().join("terrain.tif");
         write_terrain(&simulation, 0.25, &path).unwrap();
         let site = simulation.scene.site;
-        let terrain = Terrain::open(site, &[(path, "terrain.tif".to_owned())], None).unwrap();
+        let terrain = Terrain::open(site, &[(path, "terrain.tif".to_owned())], None, None).unwrap();
         let mut error = 0.0;
         for i in 0..40 {
             let (east, north) = (f64::from(i) * 0.713, 3.0 - f64::from(i) * 0.27);

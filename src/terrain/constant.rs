@@ -88,11 +88,8 @@ mod tests {
     /// On an ellipsoid itself (height 0) the hit is the near root of a quadratic in scaled axes.
     #[test]
     fn on_the_ellipsoid_the_closed_form_holds() {
-        let oblate = Planet {
-            name: "oblate",
-            ellipsoid: Ellipsoid { a: 6.0e6, f: 0.05 },
-            crs: "EPSG:4326",
-        };
+        let mut oblate = Planet::EARTH;
+        oblate.ellipsoid = Ellipsoid { a: 6.0e6, f: 0.05 };
         for planet in [Planet::EARTH, oblate] {
             let site = Site::new(planet, Geodetic::from_degrees(38.0, -100.0, 20.0));
             let b = planet.ellipsoid.a * (1.0 - planet.ellipsoid.f);

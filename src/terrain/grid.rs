@@ -1,6 +1,6 @@
 //! Rasters of heights and where their posts stand in a map.
 
-/// A regular raster of heights above the ellipsoid, tied to a coordinate reference system.
+/// A regular raster of heights, tied to a coordinate reference system.
 ///
 /// Heights are samples at points, the posts; post (0, 0) is the first of the first row. Where a
 /// height is unknown it is NaN.
@@ -11,6 +11,19 @@ pub struct HeightGrid {
     posts: Posts,
     crs_from_post: Affine,
     crs: String,
+    above: HeightsAbove,
+}
+
+/// What a raster's heights are above.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum HeightsAbove {
+    /// The file does not say: what the run's heights are above.
+    #[default]
+    Unsaid,
+    /// The ellipsoid.
+    Ellipsoid,
+    /// The zero of a vertical CRS, by its code.
+    Datum(String),
 }
 
 /// The heights of a raster, metres, row by row, NaN where unknown.
@@ -90,7 +103,19 @@ impl HeightGrid {
             posts,
             crs_from_post,
             crs: crs.into(),
+            above: HeightsAbove::Unsaid,
         })
+    }
+
+    /// The same raster, with what its heights are above.
+    #[must_use]
+    pub fn with_heights_above(self, above: HeightsAbove) -> Self {
+        Self { above, ..self }
+    }
+
+    /// What its heights are above.
+    pub fn heights_above(&self) -> &HeightsAbove {
+        &self.above
     }
 
     /// Posts in a row.
@@ -139,6 +164,7 @@ impl HeightGrid {
             posts,
             crs_from_post: self.crs_from_post.moved(columns.0, rows.0),
             crs: self.crs.clone(),
+            above: self.above.clone(),
         }
     }
 }

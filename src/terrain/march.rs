@@ -91,7 +91,12 @@ pub(super) fn first_hit(
         .map_or((start, start), |(a, b)| (a.max(start), b.min(far)));
     match march.run(start, (enter, leave), far) {
         Break(found) => found,
-        Continue(()) => Err(march.after(leave.max(top), far)),
+        Continue(()) => {
+            // Rasters beyond the range lie ahead still, and their heights count.
+            let ahead = bounds.is_some_and(|(_, end)| end > far);
+            let from = if ahead { far } else { leave.max(top) };
+            Err(march.after(from, far))
+        }
     }
 }
 

@@ -16,6 +16,7 @@
 //!   passed at any height, for a camera stands on ground, known or not; a ray that comes out of it
 //!   below the known surface is `OffTerrain`.
 
+mod ascii;
 mod cell;
 mod constant;
 mod geotiff;
@@ -25,20 +26,21 @@ mod leg;
 mod march;
 mod model;
 mod mosaic;
+mod open;
 mod patch;
+mod planetary;
 mod pyramid;
 mod tile;
 
 #[cfg(test)]
 mod tests;
 
-use std::path::PathBuf;
+use crate::frame::{CrsError, Direction, Enu, GeoidGrid, Point, Ray, Site};
 
-use crate::error::{Error, Fault, Place};
-use crate::frame::{CrsError, Direction, Enu, Point, Ray, Site};
-
+pub use ascii::read_ascii_grid;
 pub use geotiff::{read_geotiff, write_geotiff};
-pub use grid::{Affine, GridError, HeightGrid, Posts};
+pub use grid::{Affine, GridError, HeightGrid, HeightsAbove, Posts};
+pub use open::read_heights;
 
 use model::Model;
 
@@ -47,6 +49,7 @@ use model::Model;
 pub struct Terrain {
     site: Site,
     shape: Shape,
+    geoid_grids: Vec<GeoidGrid>,
 }
 
 #[derive(Debug)]
@@ -98,53 +101,7 @@ impl Terrain {
         Self {
             site,
             shape: Shape::Constant(height_m),
-        }
-    }
-
-    /// Height models from GeoTIFF files, of which the earlier count where they overlap; each file
-    /// comes with the name that messages call it by. The height `outside_m`, metres above the
-    /// ellipsoid, serves in holes and outside all models.
-    ///
-    /// # Errors
-    /// Where a file cannot be read, is not a GeoTIFF height model in a known CRS of the site's
-    /// planet, or lies beyond the reach of the site.
-    pub fn open(
-        site: Site,
-        files: &[(PathBuf, String)],
-        outside_m: Option<f64>,
-    ) -> Result<Self, Error> {
-        let mut faults = Vec::new();
-        let mut grids = Vec::with_capacity(files.len());
-        for (path, shown) in files {
-            match read_geotiff(path, shown) {
-                Ok(grid) => grids.push(grid),
-                Err(Error::Faults(found)) => faults.extend(found),
-                Err(error) => return Err(error),
-            }
-        }
-        if !faults.is_empty() {
-            return Err(Error::Faults(faults));
-        }
-        let in_file = |number: usize| Place::file(files[number].1.clone());
-        let terrain = Self::from_grids(site, grids, outside_m)
-            .map_err(|(number, error)| Fault::new(in_file(number), "crs", error.to_string()))?;
-        if let Shape::Model(model) = &terrain.shape {
-            for tile in &model.tiles {
-                let away = tile.distance_m(&site, Point::origin());
-                if away.is_none_or(|away| away > Site::REACH_M) {
-                    faults.push(Fault::found(
-                        in_file(tile.number),
-                        "",
-                        format!("a model {} the site's origin", far_from(away)),
-                        format!("one within {:.0} km", Site::REACH_M / 1000.0),
-                    ));
-                }
-            }
-        }
-        if faults.is_empty() {
-            Ok(terrain)
-        } else {
-            Err(Error::Faults(faults))
+            geoid_grids: Vec::new(),
         }
     }
 
@@ -162,12 +119,21 @@ impl Terrain {
             (true, Some(height_m)) => Shape::Constant(height_m),
             _ => Shape::Model(Box::new(Model::new(&site, grids, outside_m)?)),
         };
-        Ok(Self { site, shape })
+        Ok(Self {
+            site,
+            shape,
+            geoid_grids: Vec::new(),
+        })
     }
 
     /// The site whose ENU everything is in.
     pub fn site(&self) -> Site {
         self.site
+    }
+
+    /// The grids by which heights of its models were shifted to the ellipsoid.
+    pub fn geoid_grids(&self) -> &[GeoidGrid] {
+        &self.geoid_grids
     }
 
     /// The ground on the vertical line of the ENU frame at an east and a north, metres; `None`
@@ -273,12 +239,5 @@ impl Terrain {
                 None => self.site.up(place),
             },
         }
-    }
-}
-
-fn far_from(away_m: Option<f64>) -> String {
-    match away_m {
-        Some(away_m) => format!("{:.1} km from", away_m / 1000.0),
-        None => "out of reach of".to_owned(),
     }
 }

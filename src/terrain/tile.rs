@@ -139,12 +139,7 @@ impl Tile {
 
     /// How a patch rises eastwards and northwards at a place, metres a metre.
     fn slope(&self, site: &Site, place: Geodetic, patch: &Patch) -> Option<[f64; 2]> {
-        // Radii of curvature in the meridian and across it (Snyder 1987, eqs. 4-18 to 4-20).
-        let ellipsoid = site.planet().ellipsoid;
-        let e2 = ellipsoid.f * (2.0 - ellipsoid.f);
-        let w2 = 1.0 - e2 * place.lat.sin().powi(2);
-        let across = ellipsoid.a / w2.sqrt();
-        let meridian = across * (1.0 - e2) / w2;
+        let [across, meridian] = site.planet().ellipsoid.radii(place.lat);
         let step_lon = 1.0 / ((across + place.height_m) * place.lat.cos());
         let step_lat = 1.0 / (meridian + place.height_m);
         let [x, y] = self.position(place)?;
@@ -251,6 +246,16 @@ fn middle_longitude_deg(site: &Site, crs: &Crs, grid: &HeightGrid) -> Option<f64
     let turn = (x1 - x - 0.001f64.to_degrees()).rem_euclid(360.0);
     (degrees && turn.min(360.0 - turn) < 1e-4)
         .then(|| grid.crs_from_post().apply(middle.0, middle.1).0)
+}
+
+/// The part of a raster that a site can reach.
+///
+/// # Errors
+/// [`CrsError`] where PROJ does not know the raster's CRS on the site's planet.
+pub(super) fn within_reach(site: &Site, grid: HeightGrid) -> Result<HeightGrid, CrsError> {
+    let crs = Crs::new(grid.crs(), site.planet())?;
+    let middle_deg = middle_longitude_deg(site, &crs, &grid);
+    Ok(crop(site, &crs, middle_deg, grid))
 }
 
 /// The part of a raster that a site can reach, so that a model of a whole planet serves as well.

@@ -24,6 +24,8 @@ pub struct Sources<'a> {
     pub pose_sigma: PoseSigma,
     /// Longest gap of a pose log to interpolate over, seconds.
     pub max_gap_s: f64,
+    /// What the clock of the pose log shows more than that of the images, seconds.
+    pub clock_offset_s: f64,
 }
 
 /// The views, in the order of acquisition, and what was set aside on the way.
@@ -126,7 +128,7 @@ fn locate<'a>(sources: &Sources<'a>, assembly: &mut Assembly) -> Vec<Located<'a>
                 assembly.rejects.push(Reject {
                     file: shown.clone(),
                     line: Some(row.line),
-                    record: record_of(&row.key),
+                    record: row.key.record(),
                     reason: Reason::OffSite,
                     detail: format!(
                         "found a pose {:.1} km from the site's origin, expected at most {:.0} km",
@@ -147,13 +149,6 @@ fn locate<'a>(sources: &Sources<'a>, assembly: &mut Assembly) -> Vec<Located<'a>
     located
 }
 
-fn record_of(key: &PoseKey) -> String {
-    match key {
-        PoseKey::Time(time) => time.to_string(),
-        PoseKey::Image { image_id, .. } => image_id.clone(),
-    }
-}
-
 /// Images of the lists, each with its pose interpolated from the log of its platform.
 fn from_log<'a>(
     sources: &Sources<'a>,
@@ -164,7 +159,7 @@ fn from_log<'a>(
     let mut posed = Vec::new();
     for (path, shown, file) in sources.images {
         for image in &file.rows {
-            let found = pose_of(image, &tracks, sources.max_gap_s);
+            let found = pose_of(image, &tracks, sources);
             match found {
                 Ok(pose) => posed.push(Posed {
                     file: path,
@@ -182,7 +177,7 @@ fn from_log<'a>(
 fn pose_of(
     image: &ImageRow,
     tracks: &BTreeMap<Option<String>, Track>,
-    max_gap_s: f64,
+    sources: &Sources<'_>,
 ) -> Result<Pose, (Reason, String)> {
     let no_pose = |detail: String| (Reason::NoPose, detail);
     let time = image
@@ -194,7 +189,8 @@ fn pose_of(
             None => "found no pose log without a platform, expected one".into(),
         })
     })?;
-    track.at(time, max_gap_s).map_err(|why| {
+    let in_log = time.later_by(sources.clock_offset_s);
+    track.at(in_log, sources.max_gap_s).map_err(|why| {
         let reason = match why {
             crate::pose::NoPose::OutsideLog { .. } => Reason::NoPose,
             crate::pose::NoPose::Gap { .. } => Reason::PoseGap,
@@ -254,7 +250,7 @@ fn per_image<'a>(
     }
     let mut poses: HashMap<String, &Located<'a>> = HashMap::new();
     for l in located {
-        let image = record_of(&l.row.key);
+        let image = l.row.key.record();
         if poses.contains_key(&image) {
             assembly.rejects.push(Reject {
                 file: l.shown.to_owned(),

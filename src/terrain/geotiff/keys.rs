@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::terrain::HeightsAbove;
+
 pub(super) const MODEL_TYPE: u16 = 1024;
 pub(super) const RASTER_TYPE: u16 = 1025;
 pub(super) const CITATION: u16 = 1026;
@@ -122,22 +124,22 @@ impl GeoKeys {
         }
     }
 
+    /// What heights are above.
+    pub fn heights_above(&self) -> HeightsAbove {
+        match self.code(VERTICAL_TYPE) {
+            None | Some(0 | USER_DEFINED) => HeightsAbove::Unsaid,
+            // The three-dimensional WGS 84, and the codes of old by which heights are above an
+            // ellipsoid.
+            Some(4979 | 5001..=5033) => HeightsAbove::Ellipsoid,
+            Some(code) => HeightsAbove::Datum(format!("EPSG:{code}")),
+        }
+    }
+
     /// Metres in the unit of heights.
     ///
     /// # Errors
-    /// Where the heights are above something else than the ellipsoid, or in an unknown unit.
+    /// Where they are in an unknown unit.
     pub fn vertical_unit_m(&self) -> Result<f64, KeyFault> {
-        match self.code(VERTICAL_TYPE) {
-            // Undefined, user-defined, the three-dimensional WGS 84, and the codes of old by which
-            // heights are above an ellipsoid.
-            None | Some(0 | USER_DEFINED | 4979 | 5001..=5033) => {}
-            Some(code) => {
-                return Err(KeyFault::new(
-                    "VerticalGeoKey",
-                    format!("found EPSG:{code}, expected heights above the ellipsoid"),
-                ));
-            }
-        }
         match self.code(VERTICAL_UNITS) {
             None | Some(0 | USER_DEFINED) => Ok(1.0),
             Some(code) => metres(code).ok_or_else(|| {
@@ -188,21 +190,28 @@ mod tests {
     }
 
     #[test]
-    fn heights_above_a_geoid_are_refused_and_feet_are_converted() {
-        let unit = |keys: &[u16]| {
+    fn what_heights_are_above_and_in_which_unit() {
+        let parsed = |keys: &[u16]| {
             let mut directory = vec![1, 1, 0, u16::try_from(keys.len() / 4).unwrap()];
             directory.extend(keys);
-            GeoKeys::parse(&directory, &[], "")
-                .unwrap()
-                .vertical_unit_m()
+            GeoKeys::parse(&directory, &[], "").unwrap()
         };
+        let unit = |keys: &[u16]| parsed(keys).vertical_unit_m();
+        for (keys, above) in [
+            (&[4099, 0, 1, 9001][..], HeightsAbove::Unsaid),
+            (&[4096, 0, 1, 32767], HeightsAbove::Unsaid),
+            (&[4096, 0, 1, 5030], HeightsAbove::Ellipsoid),
+            (&[4096, 0, 1, 4979], HeightsAbove::Ellipsoid),
+            (
+                &[4096, 0, 1, 5773],
+                HeightsAbove::Datum("EPSG:5773".to_owned()),
+            ),
+        ] {
+            assert_eq!(parsed(keys).heights_above(), above);
+        }
         assert_eq!(unit(&[]), Ok(1.0));
         assert_eq!(unit(&[4096, 0, 1, 5030, 4099, 0, 1, 9001]), Ok(1.0));
         assert_eq!(unit(&[4099, 0, 1, 9002]), Ok(0.3048));
-        assert_eq!(
-            unit(&[4096, 0, 1, 5773]).unwrap_err().problem,
-            "found EPSG:5773, expected heights above the ellipsoid"
-        );
         assert_eq!(
             unit(&[4099, 0, 1, 9036]).unwrap_err().problem,
             "found unit 9036, expected 9001 (metre), 9002 or 9003 (foot)"

@@ -27,9 +27,8 @@ type Reader = Decoder<BufReader<File>>;
 
 /// Reads a height model: the first image of a GeoTIFF, of one band of any sample type, in strips or
 /// tiles. Posts are at the centres of the pixels, or at their corners where the file says
-/// `PixelIsPoint`; those of the nodata value and those that are no numbers are unknown. Heights are
-/// above the ellipsoid; feet become metres, and GDAL's scale and offset are applied. Messages call
-/// the file `shown`.
+/// `PixelIsPoint`; those of the nodata value and those that are no numbers are unknown. Feet
+/// become metres, and GDAL's scale and offset are applied. Messages call the file `shown`.
 ///
 /// # Errors
 /// [`Error::Io`] where the file cannot be opened, and faults that name what was found and expected
@@ -108,8 +107,9 @@ fn read(file: BufReader<File>, size: u64) -> Result<HeightGrid, Problem> {
     if (0..posts.len()).all(|i| posts.get(i).is_nan()) {
         return Err(Problem::found("", "no known height", "some"));
     }
-    HeightGrid::new(width as usize, height as usize, posts, map, definition)
-        .map_err(|error| Problem::Field("", error.to_string()))
+    let grid = HeightGrid::new(width as usize, height as usize, posts, map, definition)
+        .map_err(|error| Problem::Field("", error.to_string()))?;
+    Ok(grid.with_heights_above(keys.heights_above()))
 }
 
 /// One chunk may be as large as a whole file; sizes are checked before anything is read.
@@ -134,15 +134,20 @@ fn check_image(reader: &mut Reader, size: u64) -> Result<(u32, u32), Problem> {
             "1, a band of heights",
         ));
     }
-    // Uncompressed, LZW, deflate by its two codes, PackBits.
+    // Uncompressed, LZW, deflate by its two codes, PackBits, Zstandard.
     let compression = reader
         .find_tag_unsigned::<u16>(Tag::Compression)?
         .unwrap_or(1);
-    if ![1, 5, 8, 32773, 32946].contains(&compression) {
+    if ![1, 5, 8, 32773, 32946, 50000].contains(&compression) {
         return Err(Problem::found(
             "Compression",
-            format!("method {compression}"),
-            "1 (none), 5 (LZW), 8 (deflate) or 32773 (PackBits)",
+            match compression {
+                34887 => "method 34887 (LERC)".to_owned(),
+                7 => "method 7 (JPEG)".to_owned(),
+                50001 => "method 50001 (WebP)".to_owned(),
+                _ => format!("method {compression}"),
+            },
+            "1 (none), 5 (LZW), 8 (deflate), 32773 (PackBits) or 50000 (Zstandard)",
         ));
     }
     // The decoder would turn the heights upside down.

@@ -10,7 +10,7 @@ use tiff::tags::Tag;
 
 use super::*;
 use crate::frame::{Geodetic, Planet, Site};
-use crate::terrain::{Affine, HeightGrid, Posts, Terrain};
+use crate::terrain::{Affine, HeightGrid, HeightsAbove, Posts, Terrain};
 
 const UTM_KEYS: &[u16] = &[1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32632];
 const SCALE: &[f64] = &[2.0, 2.0, 0.0];
@@ -294,12 +294,55 @@ fn strips_and_compression_change_nothing() {
     }
 }
 
+/// Sets the value of an entry of the one directory of a little-endian classic file.
+fn set_entry(file: &mut [u8], tag: u16, value: u32) {
+    let start = u32::from_le_bytes(file[4..8].try_into().unwrap()) as usize;
+    let count = u16::from_le_bytes(file[start..start + 2].try_into().unwrap());
+    let at = (0..usize::from(count))
+        .map(|i| start + 2 + 12 * i)
+        .find(|&at| file[at..at + 2] == tag.to_le_bytes())
+        .unwrap();
+    let is_short = file[at + 2] == 3;
+    let value = value.to_le_bytes();
+    let width = if is_short { 2 } else { 4 };
+    file[at + 8..at + 8 + width].copy_from_slice(&value[..width]);
+}
+
+#[test]
+fn zstandard_is_unpacked() {
+    let folder = tempfile::tempdir().unwrap();
+    let heights = [1.0f32, 2.0, 3.0, 4.0, 5.0, 6.5];
+    let mut bytes = std::fs::read(file::<Gray32Float>(&folder, &utm(), &heights)).unwrap();
+    let raw: Vec<u8> = heights.into_iter().flat_map(f32::to_le_bytes).collect();
+    let packed = zstd::encode_all(&raw[..], 3).unwrap();
+    set_entry(&mut bytes, 259, 50000);
+    let end = u32::try_from(bytes.len()).unwrap();
+    set_entry(&mut bytes, 273, end);
+    set_entry(&mut bytes, 279, u32::try_from(packed.len()).unwrap());
+    bytes.extend(packed);
+    let path = folder.path().join("zstd.tif");
+    std::fs::write(&path, bytes).unwrap();
+    let grid = read_geotiff(&path, "zstd.tif").unwrap();
+    assert_eq!(grid.posts(), &Posts::F32(heights.to_vec()));
+}
+
+#[test]
+fn a_vertical_crs_is_kept_with_the_heights() {
+    let keys: Vec<u16> = [&[1, 1, 0, 3], &UTM_KEYS[4..], &[4096, 0, 1, 5773]].concat();
+    let grid = floats(&Tags { keys, ..utm() }).unwrap();
+    let datum = HeightsAbove::Datum("EPSG:5773".to_owned());
+    assert_eq!(grid.heights_above(), &datum);
+    assert_eq!(
+        floats(&utm()).unwrap().heights_above(),
+        &HeightsAbove::Unsaid
+    );
+}
+
 #[test]
 fn what_does_not_serve_is_told_exactly() {
     let scale = (Tag::ModelPixelScaleTag, SCALE);
     let tie = (Tag::ModelTiepointTag, TIE);
     let ties = [0.0; 24];
-    let vertical: Vec<u16> = [&[1, 1, 0, 3], &UTM_KEYS[4..], &[4096, 0, 1, 5773]].concat();
     let mut words = utm();
     words.nodata = Some("none");
     for (tags, expected) in [
@@ -321,10 +364,6 @@ fn what_does_not_serve_is_told_exactly() {
             tags(UTM_KEYS, &[(Tag::ModelPixelScaleTag, &[0.0; 3]), tie]),
             "found georeferencing that puts all posts on one line, expected one that spans an area",
         ),
-        (
-            tags(&vertical, &[scale, tie]),
-            "VerticalGeoKey: found EPSG:5773, expected heights above the ellipsoid",
-        ),
         (words, "GDAL_NODATA: found \"none\", expected a number"),
     ] {
         assert_eq!(
@@ -339,17 +378,15 @@ fn what_does_not_serve_is_told_exactly() {
         said(&bands),
         "terrain.tif: SamplesPerPixel: found 3, expected 1, a band of heights"
     );
-    // ZSTD, by its code in place of the code for none.
-    let mut zstd = std::fs::read(file::<Gray32Float>(&folder, &utm(), &[0.0; 6])).unwrap();
-    let code = [3, 1, 3, 0, 1, 0, 0, 0, 1, 0, 0, 0];
-    let at = zstd.windows(12).position(|entry| entry == code).unwrap();
-    zstd[at + 8..at + 10].copy_from_slice(&50000u16.to_le_bytes());
-    let packed = folder.path().join("zstd.tif");
-    std::fs::write(&packed, zstd).unwrap();
+    // LERC, by its code in place of the code for none.
+    let mut lerc = std::fs::read(file::<Gray32Float>(&folder, &utm(), &[0.0; 6])).unwrap();
+    set_entry(&mut lerc, 259, 34887);
+    let packed = folder.path().join("lerc.tif");
+    std::fs::write(&packed, lerc).unwrap();
     assert_eq!(
         said(&packed),
-        "terrain.tif: Compression: found method 50000, expected 1 (none), 5 (LZW), 8 (deflate) or \
-         32773 (PackBits)"
+        "terrain.tif: Compression: found method 34887 (LERC), expected 1 (none), 5 (LZW), 8 \
+         (deflate), 32773 (PackBits) or 50000 (Zstandard)"
     );
     let unknown = file::<Gray32Float>(&folder, &utm(), &[f32::NAN; 6]);
     assert_eq!(
@@ -380,7 +417,9 @@ fn faults_of_all_files_are_told_together() {
     let files = ["a.tif", "b.tif"].map(|shown| (words.clone(), shown.to_owned()));
     let site = Site::new(Planet::EARTH, Geodetic::from_degrees(49.0, 8.4, 115.0));
     assert_eq!(
-        Terrain::open(site, &files, None).unwrap_err().to_string(),
+        Terrain::open(site, &files, None, None)
+            .unwrap_err()
+            .to_string(),
         "a.tif: found no TIFF file, expected a GeoTIFF height model\n\
          b.tif: found no TIFF file, expected a GeoTIFF height model"
     );
@@ -392,14 +431,18 @@ fn models_of_elsewhere_are_refused() {
     let path = file::<Gray32Float>(&folder, &utm(), &[1.0; 6]);
     let files = [(path, "a.tif".to_owned())];
     let near = Site::new(Planet::EARTH, Geodetic::from_degrees(49.0, 8.4, 115.0));
-    assert!(Terrain::open(near, &files, None).is_ok());
+    assert!(Terrain::open(near, &files, None, None).is_ok());
     let far = Site::new(Planet::EARTH, Geodetic::from_degrees(51.0, 8.4, 115.0));
     assert_eq!(
-        Terrain::open(far, &files, None).unwrap_err().to_string(),
+        Terrain::open(far, &files, None, None)
+            .unwrap_err()
+            .to_string(),
         "a.tif: found a model 223.1 km from the site's origin, expected one within 100 km"
     );
     let mars = Site::new(Planet::MARS, Geodetic::from_degrees(18.0, 77.0, 0.0));
-    let error = Terrain::open(mars, &files, None).unwrap_err().to_string();
+    let error = Terrain::open(mars, &files, None, None)
+        .unwrap_err()
+        .to_string();
     assert!(
         error.starts_with(
             "a.tif: crs: found \"EPSG:32632\", expected a coordinate reference system"

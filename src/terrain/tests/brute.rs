@@ -61,6 +61,9 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
         .fold(0.0, f64::max);
     let direction = ray.direction.xyz();
     let far = range / direction.xy().norm();
+    // A ray that never comes to known ground is judged where it leaves the rasters for good.
+    let bounds = model.within_bounds(ray.origin, [direction.x, direction.y]);
+    let leave = bounds.map_or(0.0, |(_, leave)| leave);
     let (mut t, mut before) = (0.0f64, 0.0f64);
     let (mut known, mut started) = (false, false);
     loop {
@@ -69,7 +72,7 @@ fn march(terrain: &Terrain, ray: Ray<Enu>, range: f64, longest: f64) -> Result<f
         if !known
             && over.is_none()
             && height <= model.top_m
-            && (t > far || height < model.bottom_m || t > 1000.0)
+            && (t > far || height < model.bottom_m || t > leave)
         {
             return Err(if rises {
                 Miss::AboveHorizon
@@ -265,18 +268,43 @@ fn coarse_posts_are_met_where_a_slow_march_meets_them() {
     assert!(counts[0] > 500, "{counts:?}");
 }
 
+/// Rugged ground with a round hole, a ditch of unknown posts and specks.
+fn holed(x: f64, y: f64) -> f64 {
+    let hole = (x - 5.0).hypot(y - 5.0) < 4.0 || (x + 10.0).abs() < 1.5 && y.abs() < 12.0;
+    let speck = (x.rem_euclid(17.0) - 3.0).abs() < 0.6 && (y.rem_euclid(13.0) - 3.0).abs() < 0.6;
+    if hole || speck {
+        f64::NAN
+    } else {
+        rugged(x, y)
+    }
+}
+
+/// A hundred thousand rays over ridges, walls and holes; `make acceptance` runs it.
+#[test]
+#[ignore = "it takes a minute"]
+fn a_hundred_thousand_rays_are_met_where_a_slow_march_meets_them() {
+    let solid = terrain(vec![utm_grid(81, 1.0, rugged)], None);
+    let with_holes = terrain(vec![utm_grid(81, 1.0, holed)], None);
+    let with_ground_below = terrain(vec![utm_grid(81, 1.0, holed)], Some(114.0));
+    let mut total = [0; 5];
+    for (terrain, count, seed, half, longest) in [
+        (&solid, 50_000, 11, 39.0, 1.0),
+        (&with_holes, 25_000, 12, 45.0, 0.02),
+        (&with_ground_below, 25_000, 13, 60.0, 0.02),
+    ] {
+        let rays = rays(terrain, count, seed, half);
+        let counts = compare(terrain, rays.into_iter(), longest);
+        for (all, one) in total.iter_mut().zip(counts) {
+            *all += one;
+        }
+    }
+    println!("hits, above the horizon, too far, off the model, under ground: {total:?}");
+    assert_eq!(total.iter().sum::<usize>(), 100_000);
+    assert!(total.iter().all(|&count| count > 1000), "{total:?}");
+}
+
 #[test]
 fn holes_are_passed_where_the_rule_says_so() {
-    let holed = |x: f64, y: f64| {
-        let hole = (x - 5.0).hypot(y - 5.0) < 4.0 || (x + 10.0).abs() < 1.5 && y.abs() < 12.0;
-        let speck =
-            (x.rem_euclid(17.0) - 3.0).abs() < 0.6 && (y.rem_euclid(13.0) - 3.0).abs() < 0.6;
-        if hole || speck {
-            f64::NAN
-        } else {
-            rugged(x, y)
-        }
-    };
     let terrain = terrain(vec![utm_grid(81, 1.0, holed)], None);
     let counts = compare(&terrain, rays(&terrain, 3000, 3, 45.0).into_iter(), 0.02);
     assert!(counts.iter().all(|&count| count > 40), "{counts:?}");

@@ -313,13 +313,13 @@ fn the_constant_height_answers_like_the_models() {
 #[test]
 fn a_real_model_lies_under_its_traverse() {
     let data = std::env::var("ROCKMAP_DATA").unwrap_or_else(|_| "../shared/data".to_owned());
-    let path = PathBuf::from(data).join("kitti-0001/terrain.tif");
+    let path = std::path::PathBuf::from(data).join("kitti-0001/terrain.tif");
     if !path.exists() {
         println!("skipped: no {}", path.display());
         return;
     }
     let files = [(path, "terrain.tif".to_owned())];
-    let probe = Terrain::open(site(), &files, None).unwrap();
+    let probe = Terrain::open(site(), &files, None, None).unwrap();
     let Shape::Model(model) = &probe.shape else {
         panic!("a model");
     };
