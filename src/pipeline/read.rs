@@ -10,7 +10,7 @@ use super::config::Config;
 use super::digest::{InputFile, digest};
 use super::paths::Source;
 use super::pictures::PictureDigest;
-use crate::camera::{Camera, read_cameras};
+use crate::camera::{Camera, CameraFile, read_camera_file};
 use crate::detection::{Detection, DetectionFile, read_detections};
 use crate::error::{Error, Fault, Place};
 use crate::frame::{Geodetic, Site};
@@ -56,13 +56,14 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
     let poses = faults.read_all(&input.poses, |s, _| read_poses(&s.path, &s.shown, crs));
     let is_log = poses.iter().any(|(_, _, p)| !p.is_per_image);
     let images = faults.read_all(&input.images, |s, _| read_images(&s.path, &s.shown, is_log));
-    let cameras = faults.read_all(&input.cameras, |s, _| read_cameras(&s.path, &s.shown));
+    let cameras = faults.read_all(&input.cameras, |s, _| read_camera_file(&s.path, &s.shown));
     let detections = faults.read_all(&input.detections, |s, i| {
         read_detections(&s.path, &s.shown, i)
     });
     let site = site(config, &poses, &mut faults);
     let terrain = terrain(config, site, &mut faults);
     cross_checks(config, &poses, &detections, &mut faults);
+    let notes: Vec<String> = cameras.iter().flat_map(|c| c.2.notes.clone()).collect();
     let cameras = all_cameras(cameras, &mut faults);
     faults.none()?;
 
@@ -82,7 +83,7 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
         detections: Vec::new(),
         detection_files: input.detections.iter().map(|s| s.shown.clone()).collect(),
         rejects: Vec::new(),
-        warnings: Vec::new(),
+        warnings: notes,
         files,
         pictures: PictureDigest::default(),
     };
@@ -215,13 +216,10 @@ fn terrain(config: &Config, site: Site, faults: &mut Faults) -> Option<Terrain> 
     }
 }
 
-fn all_cameras(
-    files: Vec<Read<crate::camera::Cameras>>,
-    faults: &mut Faults,
-) -> BTreeMap<String, Arc<Camera>> {
+fn all_cameras(files: Vec<Read<CameraFile>>, faults: &mut Faults) -> BTreeMap<String, Arc<Camera>> {
     let mut all = BTreeMap::new();
-    for (_, shown, cameras) in files {
-        for (name, camera) in cameras {
+    for (_, shown, file) in files {
+        for (name, camera) in file.cameras {
             if all.insert(name.clone(), Arc::new(camera)).is_some() {
                 let field = format!("cameras.{name}");
                 let fault = Fault::found(Place::file(&shown), field, "the camera twice", "it once");

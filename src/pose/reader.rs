@@ -4,10 +4,11 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::{Attitude, PoseKey, PoseRow, Position, Time};
+use super::lines::{self, LogFormat};
+use super::{Attitude, PoseKey, PoseRow, Position, Time, colmap, odometry, tum};
 use crate::error::{Error, Fault};
 use crate::frame::{Crs, Geodetic, Point};
-use crate::input::{Reject, Row, Table};
+use crate::input::{Reject, Row, Table, text};
 
 /// What a poses.csv holds.
 #[derive(Debug)]
@@ -85,12 +86,20 @@ enum Attitudes {
     None,
 }
 
-/// Reads poses.csv. `crs` is the one easting and northing columns are in, if the run names one.
+/// Reads poses.csv, or one of the other logs that the content tells: a trajectory of the TUM
+/// benchmarks, images.txt of COLMAP, a table of a ROS odometry topic. `crs` is the one easting and
+/// northing columns are in, if the run names one.
 ///
 /// # Errors
 /// A file that cannot be read, a missing column, or a set of columns that is none of the variants;
 /// bad rows are set aside in the result.
 pub fn read_poses(path: &Path, shown: &str, crs: Option<&Crs>) -> Result<PoseFile, Error> {
+    match lines::recognise(path)? {
+        Some(LogFormat::Tum) => return Ok(tum::read(&text(path, shown)?, shown)),
+        Some(LogFormat::Colmap) => return Ok(colmap::read(&text(path, shown)?, shown)),
+        Some(LogFormat::Odometry) => return odometry::read(path, shown),
+        None => {}
+    }
     let mut table = Table::open(path, shown)?;
     let is_per_image = table.has("image_id");
     if !is_per_image && !table.has("time") {
