@@ -102,6 +102,3 @@ fn picture_beside(label: &Path, image_id: &str) -> Option<PathBuf> {
     }
     None
 }
-
-#[cfg(test)]
-mod tests;
