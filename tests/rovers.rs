@@ -47,7 +47,7 @@ fn pointing(label: &Path, pixel: Pixel) -> [f64; 2] {
     [azimuth, up.asin().to_degrees()]
 }
 
-/// The label says the same of the middle of its picture: SITE_DERIVED_GEOMETRY_PARMS, azimuth
+/// The label says the same of the middle of its picture: `SITE_DERIVED_GEOMETRY_PARMS`, azimuth
 /// 141.721, elevation -39.482.
 #[test]
 fn a_curiosity_label_points_where_it_says() {
@@ -320,7 +320,7 @@ fn what_import_is_told_and_what_it_writes() {
     );
     assert_eq!(
         String::from_utf8(output.stderr).unwrap(),
-        "note: a.json: NLE_0002_0667129493_453ECM_N0030000NCAM00101_00_4LLJ: no attitude\n"
+        "note: a.json: NLE_0002_0667129493_453ECM_N0030000NCAM00101_00_4LLJ: the record has no attitude\n"
     );
     let poses = fs::read_to_string(home.path().join("with/poses.csv")).unwrap();
     assert!(

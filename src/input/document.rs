@@ -23,6 +23,32 @@ pub(super) struct Node {
     pub(super) kind: Kind,
 }
 
+/// A table that a parser is filling.
+pub(super) struct Group {
+    pub(super) name: String,
+    pub(super) place: Place,
+    pub(super) entries: Vec<(String, Node)>,
+}
+
+impl Group {
+    pub(super) fn new(name: String, place: Place) -> Self {
+        Self {
+            name,
+            place,
+            entries: Vec::new(),
+        }
+    }
+
+    /// The table with its name.
+    pub(super) fn close(self) -> (String, Node) {
+        let node = Node {
+            place: self.place,
+            kind: Kind::Table(self.entries),
+        };
+        (self.name, node)
+    }
+}
+
 #[derive(Debug, Clone)]
 pub(super) enum Kind {
     Text(String),

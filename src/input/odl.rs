@@ -2,7 +2,7 @@
 //! chapter 12), attached to a picture or in a file of their own.
 
 use super::Document;
-use super::document::{Kind, Node};
+use super::document::{Group, Kind, Node};
 use crate::error::{Fault, Place};
 
 /// Deeper than any label nests.
@@ -19,8 +19,8 @@ impl Document {
     /// What is not ODL, with line and column.
     pub fn parse_odl(text: &str, shown: &str) -> Result<Self, Fault> {
         let mut scanner = Scanner::new(text, shown);
-        let mut open: Vec<(String, Place, Vec<(String, Node)>)> = Vec::new();
-        let mut top: Vec<(String, Node)> = Vec::new();
+        let mut top = Group::new(String::new(), Place::file(shown));
+        let mut open: Vec<Group> = Vec::new();
         while let Some((place, keyword)) = scanner.keyword()? {
             match keyword {
                 "END" => break,
@@ -29,50 +29,29 @@ impl Document {
                     let name = scanner.word("the name of a group")?;
                     if open.len() >= DEEPEST {
                         let expected = format!("at most {DEEPEST}");
-                        return Err(Fault::found(place, name, "more groups than that", expected));
+                        let found = "more groups than that";
+                        return Err(Fault::found(place, name, found, expected));
                     }
-                    open.push((name, place, Vec::new()));
+                    open.push(Group::new(name, place));
                 }
                 "END_GROUP" | "END_OBJECT" => {
-                    let named = scanner.has_equals().then(|| scanner.word("a name"));
-                    let named = named.transpose()?;
-                    let Some((name, begun, entries)) = open.pop() else {
-                        return Err(Fault::found(place, keyword, "an end", "a GROUP before it"));
-                    };
-                    if named.as_ref().is_some_and(|n| *n != name) {
-                        let found = named.unwrap_or_default();
-                        return Err(Fault::found(place, keyword, found, name));
-                    }
-                    let node = Node {
-                        place: begun,
-                        kind: Kind::Table(entries),
-                    };
-                    open.last_mut()
-                        .map_or(&mut top, |g| &mut g.2)
-                        .push((name, node));
+                    let group = scanner.end(place, keyword, open.pop())?;
+                    open.last_mut().unwrap_or(&mut top).entries.push(group);
                 }
                 _ => {
                     scanner.equals(keyword)?;
                     let kind = scanner.value(keyword, DEEPEST)?;
                     let name = keyword.rsplit(':').next().unwrap_or(keyword).to_owned();
-                    let entries = open.last_mut().map_or(&mut top, |g| &mut g.2);
-                    entries.push((name, Node { place, kind }));
+                    let group = open.last_mut().unwrap_or(&mut top);
+                    group.entries.push((name, Node { place, kind }));
                 }
             }
         }
-        if let Some((name, place, _)) = open.pop() {
-            return Err(Fault::found(
-                place,
-                name,
-                "no end of this group",
-                "END_GROUP",
-            ));
+        if let Some(Group { name, place, .. }) = open.pop() {
+            let found = "no end of this group";
+            return Err(Fault::found(place, name, found, "END_GROUP"));
         }
-        let root = Node {
-            place: Place::file(shown),
-            kind: Kind::Table(top),
-        };
-        Ok(Document::of(shown, root))
+        Ok(Document::of(shown, top.close().1))
     }
 }
 
@@ -167,6 +146,25 @@ impl<'a> Scanner<'a> {
             "no value",
             "= and a value",
         ))
+    }
+
+    /// The end of a group, which may name it.
+    fn end(
+        &mut self,
+        place: Place,
+        keyword: &str,
+        open: Option<Group>,
+    ) -> Result<(String, Node), Fault> {
+        let Some(group) = open else {
+            return Err(Fault::found(place, keyword, "an end", "a GROUP before it"));
+        };
+        if self.has_equals() {
+            let named = self.word("the name of a group")?;
+            if named != group.name {
+                return Err(Fault::found(place, keyword, named, group.name));
+            }
+        }
+        Ok(group.close())
     }
 
     fn word(&mut self, expected: &str) -> Result<String, Fault> {

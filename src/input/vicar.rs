@@ -1,7 +1,7 @@
 //! Labels of VICAR pictures: `KEY=VALUE` in one long line, in sections that `PROPERTY` begins.
 
 use super::Document;
-use super::document::{Kind, Node};
+use super::document::{Group, Kind, Node};
 use crate::error::{Fault, Place};
 
 impl Document {
@@ -19,36 +19,26 @@ impl Document {
             at: 0,
             end: text.len(),
         };
-        let mut top: Vec<(String, Node)> = Vec::new();
-        let mut property: Option<(String, Place, Vec<(String, Node)>)> = None;
+        let mut top = Group::new(String::new(), Place::file(shown));
+        let mut property: Option<Group> = None;
         while let Some((place, key, kind)) = scanner.entry()? {
             match (key.as_str(), kind) {
                 ("TASK", _) => break,
                 ("PROPERTY", Kind::Text(name)) => {
-                    close(property.replace((name, place, Vec::new())), &mut top);
+                    let before = property.replace(Group::new(name, place));
+                    top.entries.extend(before.map(Group::close));
                 }
                 (_, kind) => {
                     if let ("LBLSIZE", Kind::Number(size)) = (key.as_str(), &kind) {
                         scanner.limit(*size);
                     }
-                    let entries = property.as_mut().map_or(&mut top, |p| &mut p.2);
-                    entries.push((key, Node { place, kind }));
+                    let group = property.as_mut().unwrap_or(&mut top);
+                    group.entries.push((key, Node { place, kind }));
                 }
             }
         }
-        close(property, &mut top);
-        let root = Node {
-            place: Place::file(shown),
-            kind: Kind::Table(top),
-        };
-        Ok(Document::of(shown, root))
-    }
-}
-
-fn close(property: Option<(String, Place, Vec<(String, Node)>)>, top: &mut Vec<(String, Node)>) {
-    if let Some((name, place, entries)) = property {
-        let kind = Kind::Table(entries);
-        top.push((name, Node { place, kind }));
+        top.entries.extend(property.map(Group::close));
+        Ok(Document::of(shown, top.close().1))
     }
 }
 

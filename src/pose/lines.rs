@@ -36,10 +36,10 @@ pub(super) fn recognise(path: &Path) -> Result<Option<LogFormat>, Error> {
     }
     let words: Vec<&str> = first.split_whitespace().collect();
     let is_number = |word: &&str| word.parse::<f64>().is_ok();
-    if words.len() == 8 && words.iter().all(|w| is_number(&w)) {
+    if words.len() == 8 && words.iter().all(is_number) {
         return Ok(Some(LogFormat::Tum));
     }
-    let is_colmap = words.len() >= 10 && words[..9].iter().all(|w| is_number(&w));
+    let is_colmap = words.len() >= 10 && words[..9].iter().all(is_number);
     Ok(is_colmap.then_some(LogFormat::Colmap))
 }
 

@@ -1,4 +1,4 @@
-//! Labels of pictures from the surface of Mars: MER, Phoenix, MSL, InSight, in ODL (PDS3) or VICAR.
+//! Labels of pictures from the surface of Mars: MER, Phoenix, MSL, `InSight`, in ODL (PDS3) or VICAR.
 
 use super::Found;
 use super::fields::required;

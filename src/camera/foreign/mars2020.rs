@@ -204,8 +204,8 @@ fn pose(record: &Section, id: &str, found: &mut Found) -> Option<RoverPose> {
     }
     match (xyz, turned) {
         (Some(_), Some(_)) => {}
-        (None, _) => found.note(format!("{id}: no xyz: no pose")),
-        (_, None) => found.note(format!("{id}: no attitude")),
+        (None, _) => found.note(format!("{id}: the record has no xyz, and so no pose")),
+        (_, None) => found.note(format!("{id}: the record has no attitude")),
     }
     let site = record.counters("site").and_then(|c| c.first().copied());
     let site = site.or_else(|| record.text("site")?.parse().ok());

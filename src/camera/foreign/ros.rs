@@ -6,14 +6,18 @@ use super::fields::{NO_MOUNT, fisheye, of_matrix, required, side, spelling, stan
 use crate::camera::{Intrinsics, Lens};
 use crate::input::Section;
 
-const MODELS: [&str; 4] = ["plumb_bob", "rational_polynomial", "equidistant", ""];
+const MODELS: [&str; 3] = ["plumb_bob", "rational_polynomial", "equidistant"];
 
 pub(super) fn read(root: &Section, stem: &str, found: &mut Found) {
     let width = side(root, spelling(root, &["image_width", "width"]));
     let height = side(root, spelling(root, &["image_height", "height"]));
     let intrinsics = intrinsics(root);
     let model = required(root, "distortion_model", "the name of a model", |s, key| {
-        s.word(key, &MODELS)
+        // Drivers of ideal cameras leave the name empty.
+        match s.shown(key).as_str() {
+            "\"\"" => Some(String::new()),
+            _ => s.word(key, &MODELS),
+        }
     });
     let key = spelling(root, &["distortion_coefficients", "D", "d"]);
     let distortion = coefficients(root, key);

@@ -66,7 +66,7 @@ fn faults_of_ros_files() {
         faults("ros.yaml", "plumb_bob", "plum_bob"),
         [
             "ros.yaml:8:1: distortion_model: found \"plum_bob\", expected one of plumb_bob, \
-             rational_polynomial, equidistant,  (is plumb_bob meant?)"
+             rational_polynomial, equidistant (is plumb_bob meant?)"
         ]
     );
     assert_eq!(
