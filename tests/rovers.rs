@@ -81,8 +81,8 @@ fn an_insight_label_points_where_it_says() {
         CameraFormat::VicarLabel
     );
     let [azimuth, elevation] = pointing(&label, Pixel::new(511.5, 511.5));
-    assert!((azimuth - 178.812).abs() < 0.05, "{azimuth}");
-    assert!((elevation + 60.9945).abs() < 0.05, "{elevation}");
+    assert!((azimuth - 178.812).abs() < 0.001, "{azimuth}");
+    assert!((elevation + 60.9945).abs() < 0.001, "{elevation}");
 }
 
 /// Rocks on level ground of Mars, and the platform's poses among them.
@@ -300,7 +300,7 @@ fn imported_records_make_a_map() {
     let mixed = import(&["a.json", "b.json", "--to", "other"], home.path());
     assert_eq!(
         String::from_utf8(mixed.stderr).unwrap(),
-        "error: b.json: site: found 4, expected 3, that of a.json: places are told from one site\n"
+        "error: b.json: site: found 4, expected 3, that of a.json, or a label that says where the one lies in the other\n"
     );
     assert!(!home.path().join("other").exists());
 }
@@ -318,9 +318,9 @@ fn what_import_is_told_and_what_it_writes() {
         &["a.json", "--to", "with", "-q", "--attitude", "0.8,0,0,0.6"],
         home.path(),
     );
-    assert_eq!(
-        String::from_utf8(output.stderr).unwrap(),
-        "note: a.json: NLE_0002_0667129493_453ECM_N0030000NCAM00101_00_4LLJ: the record has no attitude\n"
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{output:?}"
     );
     let poses = fs::read_to_string(home.path().join("with/poses.csv")).unwrap();
     assert!(
@@ -329,7 +329,11 @@ fn what_import_is_told_and_what_it_writes() {
     );
     let images = fs::read_to_string(home.path().join("with/images.csv")).unwrap();
     assert!(images.ends_with(",../a.png\n"), "{images}");
-    import(&["a.json", "--to", "without", "-q"], home.path());
+    let output = import(&["a.json", "--to", "without", "-q"], home.path());
+    assert_eq!(
+        String::from_utf8(output.stderr).unwrap(),
+        "note: a.json: NLE_0002_0667129493_453ECM_N0030000NCAM00101_00_4LLJ: no attitude is told\n"
+    );
     let poses = fs::read_to_string(home.path().join("without/poses.csv")).unwrap();
     assert!(poses.starts_with("image_id,x_m,y_m,z_m\n"), "{poses}");
     let wrong = import(

@@ -36,7 +36,7 @@ pub use cahvore::{Cahvore, Linearity};
 pub use equirectangular::Equirectangular;
 pub use fisheye::Fisheye;
 pub use foreign::{
-    CameraFile, CameraFormat, RoverImage, RoverPose, attitude_of_ned, cameras_from_bytes,
+    CameraFile, CameraFormat, RoverImage, RoverPose, SiteLink, attitude_of_ned, cameras_from_bytes,
     read_camera_file,
 };
 pub use lens::{BadLens, Lens, LensError};

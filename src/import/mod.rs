@@ -1,6 +1,7 @@
 //! Files of others turned into this program's own: cameras into `cameras.toml`, and the poses that
 //! labels and JSON of rover pictures carry into `poses.csv` and `images.csv`.
 
+mod sites;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -31,15 +32,15 @@ pub struct ImportedImage {
     pub picture: Option<PathBuf>,
 }
 
-/// Reads all files. A record without an attitude gets `attitude`, if it is given.
+/// Reads all files. The places of all pictures are told from the first one's site. A record without an attitude gets `attitude`, if it is given.
 ///
 /// # Errors
-/// All faults in the files at once; a camera that two files have, or pictures of different sites,
-/// whose places cannot be told in one frame.
+/// All faults in the files at once; a camera that two files have, or pictures of different sites
+/// that no label ties together.
 pub fn read(files: &[PathBuf], attitude: Option<Rotation<Enu, Body>>) -> Result<Imported, Error> {
     let mut imported = Imported::default();
     let mut faults = Vec::new();
-    let mut first_site: Option<(u32, String)> = None;
+    let mut origins = Vec::new();
     for path in files {
         let shown = path.display().to_string();
         let file = match read_camera_file(path, &shown) {
@@ -59,21 +60,22 @@ pub fn read(files: &[PathBuf], attitude: Option<Rotation<Enu, Body>>) -> Result<
                 faults.push(Fault::found(place, name, "the camera twice", "it once"));
             }
         }
+        let mut notes = file.notes;
         for mut image in file.images {
-            if let Some(site) = image.pose.site.filter(|_| image.pose.place.is_some()) {
-                let (first, other) = first_site.get_or_insert_with(|| (site, shown.clone()));
-                if *first != site {
-                    let expected =
-                        format!("{first}, that of {other}: places are told from one site");
-                    faults.push(Fault::found(Place::file(&shown), "site", site, expected));
-                }
-            }
             image.pose.attitude = image.pose.attitude.or(attitude);
+            let id = &image.image_id;
+            match (image.pose.place, image.pose.attitude) {
+                (None, _) => notes.push(format!("{shown}: {id}: no position is told, so no pose")),
+                (_, None) => notes.push(format!("{shown}: {id}: no attitude is told")),
+                _ => {}
+            }
             let picture = picture_beside(path, &image.image_id);
             imported.images.push(ImportedImage { image, picture });
+            origins.push(shown.clone());
         }
-        imported.notes.extend(file.notes);
+        imported.notes.extend(notes);
     }
+    faults.extend(sites::join(&mut imported.images, &origins));
     if faults.is_empty() {
         Ok(imported)
     } else {

@@ -2,9 +2,9 @@
 
 use super::Found;
 use super::fields::required;
-use super::rover::{RoverImage, RoverPose, Vectors, after, linearity, step, utc};
+use super::rover::{RoverImage, RoverPose, SiteLink, Vectors, after, linearity, place, step, utc};
 use super::window::{Counts, Window};
-use crate::frame::{Body, Enu, RigidTransform};
+use crate::frame::{Body, Enu, Point, RigidTransform};
 use crate::input::Section;
 
 /// More steps than any chain of frames has.
@@ -34,6 +34,7 @@ pub(super) fn read(root: &Section, stem: &str, found: &mut Found) {
             time,
             camera,
             pose,
+            link: link(root),
         });
     }
 }
@@ -267,6 +268,24 @@ fn pose(root: &Section, model: &Section, found: &mut Found) -> Option<RoverPose>
         expected,
     );
     None
+}
+
+/// Where the site lies in the one before it, for labels that tell it of frames with parallel axes.
+fn link(root: &Section) -> Option<SiteLink> {
+    let groups = ["SITE_COORDINATE_SYSTEM", "SITE_COORDINATE_SYSTEM_PARMS"];
+    let site = groups
+        .into_iter()
+        .find_map(|key| root.tables(key).into_iter().next())?;
+    let number = |key: &str| site.counters(key)?.first().copied().and_then(site_number);
+    let offset = site.counters("ORIGIN_OFFSET_VECTOR")?;
+    let offset = place(<[f64; 3]>::try_from(offset).ok()?);
+    let turned = site.counters("ORIGIN_ROTATION_QUATERNION");
+    let parallel = turned.is_none_or(|q| q.iter().skip(1).all(|x| x.abs() < 1e-9));
+    parallel.then_some(SiteLink {
+        site: number("COORDINATE_SYSTEM_INDEX")?,
+        reference: number("REFERENCE_COORD_SYSTEM_INDEX")?,
+        offset: offset - Point::origin(),
+    })
 }
 
 pub(super) fn site_number(x: f64) -> Option<u32> {

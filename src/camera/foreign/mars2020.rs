@@ -48,7 +48,7 @@ fn image(record: &Section, found: &mut Found) {
         return;
     };
     let time = record.text("date_taken_utc").and_then(|text| utc(&text));
-    let Some(pose) = pose(record, &id, found) else {
+    let Some(pose) = pose(record) else {
         return;
     };
     let (section, key) = part(record, ["camera_model_component_list", ""]);
@@ -58,6 +58,7 @@ fn image(record: &Section, found: &mut Found) {
             time,
             camera,
             pose,
+            link: None,
         });
     }
 }
@@ -193,7 +194,7 @@ fn mtype(section: &Section, key: &str, mtype: &str, parameter: &str) -> Option<L
 }
 
 /// Where the rover was, as far as the record says.
-fn pose(record: &Section, id: &str, found: &mut Found) -> Option<RoverPose> {
+fn pose(record: &Section) -> Option<RoverPose> {
     let xyz = tuple::<3>(record, ["xyz", ""])?;
     let quaternion = tuple::<4>(record, ["attitude", "rover_attitude"])?;
     let turned = quaternion.map(attitude);
@@ -201,11 +202,6 @@ fn pose(record: &Section, id: &str, found: &mut Found) -> Option<RoverPose> {
         let (section, key) = part(record, ["attitude", "rover_attitude"]);
         section.fault(key, format!("{q:?}"), "a unit quaternion, scalar first");
         return None;
-    }
-    match (xyz, turned) {
-        (Some(_), Some(_)) => {}
-        (None, _) => found.note(format!("{id}: the record has no xyz, and so no pose")),
-        (_, None) => found.note(format!("{id}: the record has no attitude")),
     }
     let site = record.counters("site").and_then(|c| c.first().copied());
     let site = site.or_else(|| record.text("site")?.parse().ok());

@@ -21,7 +21,7 @@ use super::{Camera, Cameras, cameras_from_toml};
 use crate::error::{Error, Fault, Place};
 use crate::input::Document;
 
-pub use rover::{RoverImage, RoverPose, attitude as attitude_of_ned};
+pub use rover::{RoverImage, RoverPose, SiteLink, attitude as attitude_of_ned};
 
 /// A format that cameras are read from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

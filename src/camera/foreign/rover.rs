@@ -20,6 +20,20 @@ pub struct RoverImage {
     pub camera: Camera,
     /// Where the platform was.
     pub pose: RoverPose,
+    /// Where its site lies in another, if that is told.
+    pub link: Option<SiteLink>,
+}
+
+/// Where the origin of a site frame lies in the one before it. The axes of all sites are north, east,
+/// down and count as parallel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SiteLink {
+    /// The number of the site.
+    pub site: u32,
+    /// The number of the site that the offset is told in.
+    pub reference: u32,
+    /// From the origin of the reference to that of the site.
+    pub offset: Vector<Enu>,
 }
 
 /// A platform's pose in a site frame: east, north, up from the site's origin.
