@@ -11,17 +11,32 @@ use crate::input::Section;
 const TYPES: [&str; 3] = ["CAHV", "CAHVOR", "CAHVORE"];
 
 pub(super) fn read(root: &Section, found: &mut Found) {
-    if let Some(records) = root.rows() {
-        for record in &records {
+    let records = match root.rows() {
+        Some(records) => records,
+        None if root.has("images") => root.tables("images"),
+        None => return image(root, found),
+    };
+    let mut is_one = false;
+    for record in &records {
+        // A page of the feed has pictures of cameras without a model among the others.
+        if has_model(record) {
+            is_one = true;
             image(record, found);
+        } else {
+            let id = record.name("imageid").unwrap_or_default();
+            found.note(format!(
+                "{id}: the record has no camera model and is left out"
+            ));
         }
-    } else if root.has("images") {
-        for record in &root.tables("images") {
-            image(record, found);
-        }
-    } else {
-        image(root, found);
     }
+    if !is_one {
+        root.fault("images", "no record with a camera model", "at least one");
+    }
+}
+
+fn has_model(record: &Section) -> bool {
+    let (section, key) = part(record, ["camera_model_component_list", ""]);
+    section.has(key) && !matches!(section.shown(key).as_str(), "\"UNK\"" | "\"\"")
 }
 
 /// Where a record keeps a field: by itself, or, in the feed, in its `camera` or `extended` part.

@@ -505,6 +505,34 @@ fn faults_of_mars_2020_records() {
 }
 
 #[test]
+fn records_of_a_page_without_a_model_are_left_out() {
+    let text = sample("feed.json");
+    let (start, end) = (text.find("    {\n").unwrap(), text.rfind("\n  ],").unwrap());
+    let record = &text[start..end];
+    let list = record.find("\"(1.1,").unwrap();
+    let blind = record
+        .replace(
+            &record[list..list + record[list..].find(",\n").unwrap()],
+            "\"UNK\"",
+        )
+        .replace("NLE_0002", "HELI_0002");
+    let both = text.replace(record, &format!("{blind},\n{record}"));
+    let file = read("feed.json", &both).unwrap();
+    assert_eq!(file.cameras.len(), 1);
+    assert_eq!(
+        file.notes,
+        [
+            "feed.json: HELI_0002_0667129493_453ECM_N0030000NCAM00101_00_4LLJ: the record has no camera model and is left out"
+        ]
+    );
+    let error = read("feed.json", &text.replace(record, &blind)).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "feed.json:2:3: images: found no record with a camera model, expected at least one"
+    );
+}
+
+#[test]
 fn text_is_asked_for() {
     let error = cameras_from_bytes(b"[cameras]\n\xff", Path::new("c.toml"), "c.toml").unwrap_err();
     assert_eq!(
