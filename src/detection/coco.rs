@@ -207,9 +207,9 @@ mod tests {
         let keys: Vec<String> = file.detections.iter().map(Detection::key).collect();
         assert_eq!(keys, ["7/0", "9/1"]);
         assert_eq!(file.detections[0].class.as_deref(), Some("3"));
-        assert_eq!(file.detections[0].score, Some(0.236));
+        assert_eq!(file.detections[0].score, Some(0.625));
         let [_, _, x_max, y_max] = edges(&file.detections[0]);
-        assert!((x_max - 605.91).abs() < 1e-9 && (y_max - 284.57).abs() < 1e-9);
+        assert!((x_max - 178.25).abs() < 1e-9 && (y_max - 94.25).abs() < 1e-9);
     }
 
     #[test]

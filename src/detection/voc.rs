@@ -110,8 +110,8 @@ mod tests {
         let expected = PixelBox {
             x_min: -0.5,
             y_min: 238.5,
-            x_max: 194.5,
-            y_max: 370.5,
+            x_max: 187.5,
+            y_max: 361.5,
         };
         assert_eq!(first.mark, Mark::Box(expected));
         assert_eq!((first.key().as_str(), first.line), ("r_0007/0", 10));
@@ -130,7 +130,7 @@ mod tests {
         };
         assert_eq!(
             rejects("<xmin>1<", "<xmin>201<"),
-            "voc.xml:18: annotation.object[0].bndbox.xmax: found 195, expected at least xmin, 201"
+            "voc.xml:18: annotation.object[0].bndbox.xmax: found 188, expected at least xmin, 201"
         );
         assert_eq!(
             rejects("<ymin>240<", "<ymin>24O<"),
