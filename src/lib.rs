@@ -22,6 +22,7 @@
 //! | [`evaluate`] | a map against truth |
 //! | [`simulate`] | scenes with known truth: traverses, detectors, rendered pictures |
 //! | [`bound`] | the best map that labelled detections allow |
+//! | [`import`] | cameras and poses of others turned into files of our own |
 //! | [`pipeline`] | a pipeline file to a map |
 //! | [`experiment`] | the paper's experiments, and a bench of methods over scenes |
 //! | [`cli`] | the command line |
@@ -55,6 +56,8 @@ pub mod evaluate;
 pub mod simulate;
 
 pub mod bound;
+
+pub mod import;
 
 pub mod pipeline;
 

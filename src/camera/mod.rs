@@ -12,6 +12,7 @@ mod cahvor;
 mod cahvore;
 mod equirectangular;
 mod fisheye;
+mod foreign;
 mod lens;
 mod mount;
 mod perspective;
@@ -34,6 +35,10 @@ pub use cahvor::Cahvor;
 pub use cahvore::{Cahvore, Linearity};
 pub use equirectangular::Equirectangular;
 pub use fisheye::Fisheye;
+pub use foreign::{
+    CameraFile, CameraFormat, RoverImage, RoverPose, SiteLink, attitude_of_ned, cameras_from_bytes,
+    read_camera_file,
+};
 pub use lens::{BadLens, Lens, LensError};
 pub use mount::{Mount, PanTilt};
 pub use pinhole::{Intrinsics, Pinhole};

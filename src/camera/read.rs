@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{
     BadLens, BodyAxes, BrownConrady, Cahv, CahvVectors, Cahvor, Cahvore, Camera, Cameras,
-    Equirectangular, Fisheye, Intrinsics, Lens, Linearity, Mount, Pinhole,
+    Equirectangular, Fisheye, Intrinsics, Lens, Linearity, Mount, Pinhole, read_camera_file,
 };
 use crate::error::Error;
 use crate::frame::{Point, Vector};
@@ -22,13 +22,13 @@ const MODELS: [&str; 7] = [
 
 const THREE: &str = "a list of 3 finite numbers";
 
-/// The cameras of a cameras.toml. `shown` is the name faults call the file by.
+/// The cameras of a cameras.toml, or of a file in one of the other formats that
+/// [`super::read_camera_file`] knows. `shown` is the name faults call the file by.
 ///
 /// # Errors
 /// A file that cannot be read, and every fault in it at once, with line and column.
 pub fn read_cameras(path: &Path, shown: &str) -> Result<Cameras, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
-    cameras_from_toml(&text, shown)
+    Ok(read_camera_file(path, shown)?.cameras)
 }
 
 /// The cameras of a cameras.toml's text: `[cameras.NAME]` with a lens, and `[cameras.NAME.mount]`,

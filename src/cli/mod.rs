@@ -4,6 +4,7 @@ mod bench_accuracy;
 mod check;
 mod console;
 mod evaluate;
+mod import;
 mod options;
 mod reproduce;
 mod simulate;
@@ -44,6 +45,8 @@ enum Command {
     Simulate(simulate::Args),
     /// Hold a map against the truth: precision, recall, GOSPA, calibration
     Evaluate(evaluate::Args),
+    /// Turn calibrations and rover labels of others into cameras.toml, images.csv and poses.csv
+    Import(import::Args),
     /// Make the figures of Thompson and Wettergreen (2005) anew, with this program's numbers
     Reproduce(reproduce::Args),
     /// Compare methods over many scenes and seeds
@@ -60,6 +63,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::check(&args),
         Command::Simulate(args) => simulate::simulate(&args),
         Command::Evaluate(args) => evaluate::evaluate(&args),
+        Command::Import(args) => import::import(&args),
         Command::Reproduce(args) => reproduce::reproduce(&args),
         Command::BenchAccuracy(args) => bench_accuracy::bench_accuracy(&args),
     };

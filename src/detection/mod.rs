@@ -1,6 +1,8 @@
 //! What a detector marked in the pictures.
 
+mod coco;
 mod reader;
+mod voc;
 mod writer;
 
 pub use reader::{DetectionFile, read_detections};

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::{Detection, Mark, MarkSigma, PixelBox};
+use super::{Detection, Mark, MarkSigma, PixelBox, coco, voc};
 use crate::error::{Error, Fault};
 use crate::frame::Pixel;
-use crate::input::{Reject, Row, Table};
+use crate::input::{Reject, Row, Table, first_character, text};
 
 /// What a detections.csv holds.
 #[derive(Debug)]
@@ -53,11 +53,17 @@ struct Kinds {
     bearings: bool,
 }
 
-/// Reads detections.csv, the `file`-th of the run.
+/// Reads the `file`-th detections of the run: detections.csv, annotations or results of COCO (JSON),
+/// or an annotation of Pascal VOC (XML), which the content tells.
 ///
 /// # Errors
 /// A file that cannot be read, or a missing column; bad rows are set aside in the result.
 pub fn read_detections(path: &Path, shown: &str, file: usize) -> Result<DetectionFile, Error> {
+    match first_character(path)? {
+        Some('{' | '[') => return coco::read(&text(path, shown)?, shown, file),
+        Some('<') => return voc::read(&text(path, shown)?, shown, file),
+        _ => {}
+    }
     let mut table = Table::open(path, shown)?;
     table.require(&["image_id", "det_id"])?;
     let kinds = kinds(&table)?;

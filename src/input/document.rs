@@ -1,4 +1,5 @@
-//! A TOML file whose every value knows its place, read section by section, all faults collected.
+//! A file of keys and values in which every value knows its place, read section by section, all
+//! faults collected. TOML is read here; YAML, JSON, XML and the labels of space missions beside it.
 
 use std::cell::RefCell;
 
@@ -7,7 +8,7 @@ use toml_edit::{Item, TableLike, Value};
 use super::Section;
 use crate::error::{Fault, Place};
 
-/// A parsed TOML file, with the command line's overrides laid over it.
+/// A parsed file of keys and values, with the command line's overrides laid over it.
 #[derive(Debug)]
 pub struct Document {
     pub(super) file: String,
@@ -22,6 +23,32 @@ pub(super) struct Node {
     pub(super) kind: Kind,
 }
 
+/// A table that a parser is filling.
+pub(super) struct Group {
+    pub(super) name: String,
+    pub(super) place: Place,
+    pub(super) entries: Vec<(String, Node)>,
+}
+
+impl Group {
+    pub(super) fn new(name: String, place: Place) -> Self {
+        Self {
+            name,
+            place,
+            entries: Vec::new(),
+        }
+    }
+
+    /// The table with its name.
+    pub(super) fn close(self) -> (String, Node) {
+        let node = Node {
+            place: self.place,
+            kind: Kind::Table(self.entries),
+        };
+        (self.name, node)
+    }
+}
+
 #[derive(Debug, Clone)]
 pub(super) enum Kind {
     Text(String),
@@ -29,7 +56,7 @@ pub(super) enum Kind {
     Boolean(bool),
     List(Vec<Node>),
     Table(Vec<(String, Node)>),
-    /// A date, which no key takes.
+    /// A date, which no key takes, or an empty place in a list.
     Other(String),
 }
 
@@ -48,6 +75,15 @@ impl Document {
             root: table_node(text, shown, parsed.as_table(), Place::file(shown)),
             faults: RefCell::default(),
         })
+    }
+
+    /// A document of a tree that a parser made.
+    pub(super) fn of(shown: &str, root: Node) -> Self {
+        Self {
+            file: shown.to_owned(),
+            root,
+            faults: RefCell::default(),
+        }
     }
 
     /// Lays this document over another: tables are merged key by key, every other value of this
@@ -108,6 +144,17 @@ impl Document {
     /// The whole file as a section.
     pub fn root(&self) -> Section<'_> {
         Section::root(self)
+    }
+
+    /// The name faults call the file by.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Takes the faults found since the last call, in the order they were found: those of one record,
+    /// where a file is read record by record.
+    pub fn take_faults(&self) -> Vec<Fault> {
+        std::mem::take(&mut *self.faults.borrow_mut())
     }
 
     /// All faults found while reading, in the order of the file.

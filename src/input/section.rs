@@ -218,6 +218,158 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// The same table, of which nothing is known yet.
+    pub fn again(&self) -> Section<'a> {
+        Section {
+            document: self.document,
+            node: self.node,
+            path: self.path.clone(),
+            known: RefCell::default(),
+        }
+    }
+
+    /// All tables under this key: those of a list, or of a key that stands several times, as elements
+    /// of XML and groups of labels do. What is no table answers `None` to every key.
+    pub fn tables(&self, key: &str) -> Vec<Section<'a>> {
+        self.known.borrow_mut().push(key.to_owned());
+        let Some(Kind::Table(entries)) = self.node.map(|n| &n.kind) else {
+            return Vec::new();
+        };
+        let nodes: Vec<&Node> = entries
+            .iter()
+            .filter(|(k, _)| k == key)
+            .map(|(_, n)| n)
+            .collect();
+        if let [only] = nodes[..]
+            && let Kind::List(list) = &only.kind
+        {
+            return self.numbered(key, list.iter().collect());
+        }
+        if nodes.len() == 1 {
+            let path = self.path_of(key);
+            let only = |node| Section {
+                document: self.document,
+                node: Some(node),
+                path: path.clone(),
+                known: RefCell::default(),
+            };
+            return nodes.into_iter().map(only).collect();
+        }
+        self.numbered(key, nodes)
+    }
+
+    /// The tables of a document that is a list; `None` where it is no list.
+    pub fn rows(&self) -> Option<Vec<Section<'a>>> {
+        match self.node.map(|n| &n.kind) {
+            Some(Kind::List(list)) => Some(self.numbered("", list.iter().collect())),
+            _ => None,
+        }
+    }
+
+    fn numbered(&self, key: &str, nodes: Vec<&'a Node>) -> Vec<Section<'a>> {
+        let path = self.path_of(key);
+        let section = |(i, node)| Section {
+            document: self.document,
+            node: Some(node),
+            path: format!("{path}[{i}]"),
+            known: RefCell::default(),
+        };
+        nodes.into_iter().enumerate().map(section).collect()
+    }
+
+    /// All tables below this one, with their names; one name may stand several times.
+    pub fn groups(&self) -> Vec<(String, Section<'a>)> {
+        let Some(Kind::Table(entries)) = self.node.map(|n| &n.kind) else {
+            return Vec::new();
+        };
+        let group = |(key, node): &'a (String, Node)| {
+            let is_table = matches!(node.kind, Kind::Table(_));
+            let section = Section {
+                document: self.document,
+                node: Some(node),
+                path: self.path_of(key),
+                known: RefCell::default(),
+            };
+            is_table.then(|| (key.clone(), section))
+        };
+        entries.iter().filter_map(group).collect()
+    }
+
+    /// A matrix by its rows, a list of lists, as one list.
+    pub fn matrix(&self, key: &str, rows: usize, columns: usize) -> Option<Vec<f64>> {
+        let expected = format!("{rows} lists of {columns} finite numbers");
+        let number = |n: &Node| match n.kind {
+            Kind::Number(x) if x.is_finite() => Some(x),
+            _ => None,
+        };
+        let row = |n: &Node| match &n.kind {
+            Kind::List(list) if list.len() == columns => {
+                list.iter().map(number).collect::<Option<Vec<f64>>>()
+            }
+            _ => None,
+        };
+        let matrix = self.take(key, expected, |n| match &n.kind {
+            Kind::List(list) if list.len() == rows => {
+                list.iter().map(row).collect::<Option<Vec<_>>>()
+            }
+            _ => None,
+        });
+        matrix.map(|rows| rows.concat())
+    }
+
+    /// Finite numbers in a list, or in a text that blanks part, as XML has them.
+    pub fn number_words(&self, key: &str) -> Option<Vec<f64>> {
+        let finite = |x: &f64| x.is_finite();
+        let number = |n: &Node| match n.kind {
+            Kind::Number(x) => Some(x).filter(finite),
+            _ => None,
+        };
+        self.take(key, "finite numbers", |n| match &n.kind {
+            Kind::List(list) => list.iter().map(number).collect(),
+            Kind::Text(text) => text
+                .split_whitespace()
+                .map(|word| word.parse().ok().filter(finite))
+                .collect(),
+            _ => number(n).map(|x| vec![x]),
+        })
+    }
+
+    /// True or false, or a number that is not zero or zero.
+    pub fn boolean_or_number(&self, key: &str) -> Option<bool> {
+        self.take(key, "true or false, 1 or 0", |n| match n.kind {
+            Kind::Boolean(b) => Some(b),
+            Kind::Number(x) => Some(x != 0.0),
+            _ => None,
+        })
+    }
+
+    /// A number or a list of numbers, as a list; `None`, without a fault, where it is neither.
+    pub fn counters(&self, key: &str) -> Option<Vec<f64>> {
+        let number = |n: &Node| match n.kind {
+            Kind::Number(x) => Some(x),
+            _ => None,
+        };
+        match self.get(key).map(|n| &n.kind)? {
+            Kind::List(list) => list.iter().map(number).collect(),
+            Kind::Number(x) => Some(vec![*x]),
+            _ => None,
+        }
+    }
+
+    /// Text, or a number as text: names and identifiers that happen to be digits.
+    pub fn name(&self, key: &str) -> Option<String> {
+        self.take(key, "text", |n| match &n.kind {
+            Kind::Text(t) => Some(t.clone()),
+            Kind::Number(x) => Some(x.to_string()),
+            _ => None,
+        })
+    }
+
+    /// What stands under a key, as faults show it.
+    pub fn shown(&self, key: &str) -> String {
+        self.get(key).map_or("nothing".to_owned(), Node::shown)
+    }
+
     /// A number within bounds, or one of a few words: `Ok` the one, `Err` the other.
     pub fn number_or_word(
         &self,

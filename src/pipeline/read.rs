@@ -10,7 +10,7 @@ use super::config::{Config, Heights};
 use super::digest::{InputFile, digest};
 use super::paths::Source;
 use super::pictures::PictureDigest;
-use crate::camera::{Camera, read_cameras};
+use crate::camera::{Camera, CameraFile, read_camera_file};
 use crate::detection::{Detection, DetectionFile, read_detections};
 use crate::error::{Error, Fault, Place};
 use crate::frame::{DatumError, Geodetic, Site, VerticalDatum};
@@ -61,7 +61,7 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
     });
     let is_log = poses.iter().any(|(_, _, p)| !p.is_per_image);
     let images = faults.read_all(&input.images, |s, _| read_images(&s.path, &s.shown, is_log));
-    let cameras = faults.read_all(&input.cameras, |s, _| read_cameras(&s.path, &s.shown));
+    let cameras = faults.read_all(&input.cameras, |s, _| read_camera_file(&s.path, &s.shown));
     let detections = faults.read_all(&input.detections, |s, i| {
         read_detections(&s.path, &s.shown, i)
     });
@@ -70,6 +70,7 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
     let site = site(config, origin, &poses, &mut faults);
     let terrain = terrain(config, site, datum.as_ref(), &mut faults);
     cross_checks(config, &poses, &detections, &mut faults);
+    let notes: Vec<String> = cameras.iter().flat_map(|c| c.2.notes.clone()).collect();
     let cameras = all_cameras(cameras, &mut faults);
     faults.none()?;
 
@@ -92,7 +93,7 @@ pub fn read(config: &Config, observer: &dyn Observer) -> Result<Inputs, Error> {
         detections: Vec::new(),
         detection_files: input.detections.iter().map(|s| s.shown.clone()).collect(),
         rejects: Vec::new(),
-        warnings: Vec::new(),
+        warnings: notes,
         files,
         pictures: PictureDigest::default(),
     };
@@ -314,13 +315,10 @@ fn terrain(
     }
 }
 
-fn all_cameras(
-    files: Vec<Read<crate::camera::Cameras>>,
-    faults: &mut Faults,
-) -> BTreeMap<String, Arc<Camera>> {
+fn all_cameras(files: Vec<Read<CameraFile>>, faults: &mut Faults) -> BTreeMap<String, Arc<Camera>> {
     let mut all = BTreeMap::new();
-    for (_, shown, cameras) in files {
-        for (name, camera) in cameras {
+    for (_, shown, file) in files {
+        for (name, camera) in file.cameras {
             if all.insert(name.clone(), Arc::new(camera)).is_some() {
                 let field = format!("cameras.{name}");
                 let fault = Fault::found(Place::file(&shown), field, "the camera twice", "it once");

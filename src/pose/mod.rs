@@ -4,11 +4,15 @@
 //! them in a site. A log becomes [`Track`]s, one a platform, which answer for any time between
 //! their samples and never extrapolate.
 
+mod colmap;
+mod lines;
+mod odometry;
 mod reader;
 mod record;
 mod reference;
 mod time;
 mod track;
+mod tum;
 mod writer;
 
 pub use reader::{PoseFile, read_poses};

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::{Attitude, PoseKey, PoseRow, Position, Time};
+use super::lines::{self, LogFormat};
+use super::{Attitude, PoseKey, PoseRow, Position, Time, colmap, odometry, tum};
 use crate::error::{Error, Fault};
 use crate::frame::{Crs, Geodetic, Planet, Point};
-use crate::input::{Reject, Row, Table};
+use crate::input::{Reject, Row, Table, text};
 
 /// What a poses.csv holds.
 #[derive(Debug)]
@@ -85,9 +86,11 @@ enum Attitudes {
     None,
 }
 
-/// Reads poses.csv. Latitudes and longitudes are as the planet's files have them; `crs` is the one
-/// easting and northing columns are in, if the run names one. Headings and heights are as logged:
-/// [`PoseFile::refer`] puts them into true north and above the ellipsoid.
+/// Reads poses.csv, or one of the other logs that the content tells: a trajectory of the TUM
+/// benchmarks, images.txt of COLMAP, a table of a ROS odometry topic. Latitudes and longitudes are as
+/// the planet's files have them; `crs` is the one easting and northing columns are in, if the run
+/// names one. Headings and heights are as logged: [`PoseFile::refer`] puts them into true north and
+/// above the ellipsoid.
 ///
 /// # Errors
 /// A file that cannot be read, a missing column, or a set of columns that is none of the variants;
@@ -98,6 +101,12 @@ pub fn read_poses(
     planet: Planet,
     crs: Option<&Crs>,
 ) -> Result<PoseFile, Error> {
+    match lines::recognise(path)? {
+        Some(LogFormat::Tum) => return Ok(tum::read(&text(path, shown)?, shown)),
+        Some(LogFormat::Colmap) => return Ok(colmap::read(&text(path, shown)?, shown)),
+        Some(LogFormat::Odometry) => return odometry::read(path, shown),
+        None => {}
+    }
     let mut table = Table::open(path, shown)?;
     let is_per_image = table.has("image_id");
     if !is_per_image && !table.has("time") {

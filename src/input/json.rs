@@ -1,0 +1,241 @@
+//! JSON whose every value knows its place.
+
+use serde::de::IgnoredAny;
+
+use super::Document;
+use super::document::{Kind, Node};
+use crate::error::{Fault, Place};
+
+/// Deeper than any list of cameras or annotations nests.
+const DEEPEST: usize = 100;
+
+impl Document {
+    /// Parses JSON. `shown` is the name faults call the file by. A key whose value is `null` counts
+    /// as absent.
+    ///
+    /// # Errors
+    /// What is not JSON, or a key that stands twice, with line and column.
+    pub fn parse_json(text: &str, shown: &str) -> Result<Self, Fault> {
+        // The library checks the whole text; the walk below only has to find where its values stand.
+        serde_json::from_str::<IgnoredAny>(text).map_err(|e| {
+            let place = Place {
+                file: shown.to_owned(),
+                line: Some(e.line() as u64),
+                column: Some(e.column() as u64),
+            };
+            let message = e.to_string();
+            let what = message.split(" at line ").next().unwrap_or(&message);
+            Fault::new(place, "", format!("not JSON: {what}"))
+        })?;
+        let mut walk = Walk {
+            text,
+            shown,
+            at: 0,
+            levels: DEEPEST,
+            counted: 0,
+            line: 1,
+            column: 1,
+        };
+        let kind = walk.value()?.map(|root| root.kind);
+        let root = Node {
+            place: Place::file(shown),
+            kind: kind.unwrap_or(Kind::Other("null".to_owned())),
+        };
+        Ok(Document::of(shown, root))
+    }
+}
+
+/// A walk through text that is known to be JSON.
+struct Walk<'a> {
+    text: &'a str,
+    shown: &'a str,
+    at: usize,
+    /// How many more levels may open.
+    levels: usize,
+    /// Up to where lines and columns have been counted.
+    counted: usize,
+    line: u64,
+    column: u64,
+}
+
+impl Walk<'_> {
+    fn place(&mut self) -> Place {
+        for c in self.text[self.counted..self.at].chars() {
+            if c == '\n' {
+                self.line += 1;
+                self.column = 1;
+            } else {
+                self.column += 1;
+            }
+        }
+        self.counted = self.at;
+        Place {
+            file: self.shown.to_owned(),
+            line: Some(self.line),
+            column: Some(self.column),
+        }
+    }
+
+    /// The next byte that says something.
+    fn peek(&mut self) -> u8 {
+        let bytes = self.text.as_bytes();
+        while let Some(b' ' | b'\t' | b'\r' | b'\n' | b',' | b':') = bytes.get(self.at) {
+            self.at += 1;
+        }
+        bytes.get(self.at).copied().unwrap_or(b']')
+    }
+
+    /// The next value; `None` where it is `null`.
+    fn value(&mut self) -> Result<Option<Node>, Fault> {
+        let first = self.peek();
+        let place = self.place();
+        let kind = match first {
+            b'{' | b'[' if self.levels == 0 => {
+                let expected = format!("at most {DEEPEST}");
+                return Err(Fault::found(place, "", "more levels than that", expected));
+            }
+            b'{' => self.table()?,
+            b'[' => self.list()?,
+            b'"' => Kind::Text(self.string()?),
+            _ => match self.bare() {
+                "true" => Kind::Boolean(true),
+                "false" => Kind::Boolean(false),
+                "null" => return Ok(None),
+                number => Kind::Number(number.parse().unwrap_or(f64::NAN)),
+            },
+        };
+        Ok(Some(Node { place, kind }))
+    }
+
+    fn table(&mut self) -> Result<Kind, Fault> {
+        self.at += 1;
+        self.levels -= 1;
+        let mut entries: Vec<(String, Node)> = Vec::new();
+        while self.peek() != b'}' {
+            let place = self.place();
+            let key = self.string()?;
+            if entries.iter().any(|(k, _)| *k == key) {
+                return Err(Fault::found(place, key, "the key twice", "it once"));
+            }
+            if let Some(mut node) = self.value()? {
+                node.place = place;
+                entries.push((key, node));
+            }
+        }
+        self.at += 1;
+        self.levels += 1;
+        Ok(Kind::Table(entries))
+    }
+
+    fn list(&mut self) -> Result<Kind, Fault> {
+        self.at += 1;
+        self.levels -= 1;
+        let mut list = Vec::new();
+        while self.peek() != b']' {
+            let place = self.place();
+            let empty = || Node {
+                place,
+                kind: Kind::Other("null".to_owned()),
+            };
+            let value = self.value()?;
+            list.push(value.unwrap_or_else(empty));
+        }
+        self.at += 1;
+        self.levels += 1;
+        Ok(Kind::List(list))
+    }
+
+    /// The string that begins here.
+    fn string(&mut self) -> Result<String, Fault> {
+        let bytes = self.text.as_bytes();
+        let start = self.at;
+        self.at += 1;
+        while let Some(&b) = bytes.get(self.at) {
+            self.at += if b == b'\\' { 2 } else { 1 };
+            if b == b'"' {
+                break;
+            }
+        }
+        let quoted = &self.text[start..self.at];
+        serde_json::from_str(quoted)
+            .map_err(|_| Fault::found(self.place(), "", quoted, "text of whole characters"))
+    }
+
+    /// The number or word that begins here.
+    fn bare(&mut self) -> &str {
+        let rest = &self.text[self.at..];
+        let ends = |c: char| c.is_whitespace() || matches!(c, ',' | ']' | '}');
+        let word = &rest[..rest.find(ends).unwrap_or(rest.len())];
+        self.at += word.len();
+        word
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_know_their_places() {
+        let text = "{\"a\": [1, null, -2.5e1],\n \"b\\u00e9\": {\"c\": \"x\\\"y\", \"n\": null},\n\t\"list\": [{\"u\": true}, {}]}";
+        let document = Document::parse_json(text, "d.json").unwrap();
+        let root = document.root();
+        assert_eq!(
+            root.place("b\u{e9}"),
+            Place {
+                file: "d.json".into(),
+                line: Some(2),
+                column: Some(2)
+            }
+        );
+        let b = root.section("b\u{e9}");
+        assert_eq!(b.text("c").unwrap(), "x\"y");
+        assert!(!b.has("n"));
+        let rows = root.tables("list");
+        assert_eq!(rows[0].boolean("u"), Some(true));
+        rows[1].fault("u", "nothing", "a number");
+        root.number_list("a");
+        let faults: Vec<String> = document
+            .take_faults()
+            .iter()
+            .map(Fault::to_string)
+            .collect();
+        assert_eq!(
+            faults,
+            [
+                "d.json:3:24: list[1].u: found nothing, expected a number",
+                "d.json:1:2: a: found a list of 3, expected a list of finite numbers",
+            ]
+        );
+        let list = Document::parse_json(" [{\"a\": 1}]", "d.json").unwrap();
+        assert_eq!(list.root().rows().unwrap()[0].name("a").unwrap(), "1");
+    }
+
+    #[test]
+    fn what_is_not_json_has_a_place() {
+        let fault = |text| {
+            Document::parse_json(text, "d.json")
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            fault("{\"a\": 1,\n \"b\": }"),
+            "d.json:2:7: not JSON: expected value"
+        );
+        assert_eq!(
+            fault("{\"a\": 1,\n \"a\": 2}"),
+            "d.json:2:2: a: found the key twice, expected it once"
+        );
+        assert_eq!(
+            fault("[1, 2"),
+            "d.json:1:5: not JSON: EOF while parsing a list"
+        );
+        let deep = format!("{}{}", "[".repeat(10_000), "]".repeat(10_000));
+        assert_eq!(
+            Document::parse_json(&deep, "d.json")
+                .unwrap_err()
+                .to_string(),
+            "d.json:1:101: found more levels than that, expected at most 100"
+        );
+    }
+}

@@ -1,0 +1,226 @@
+//! YAML whose every value knows its place.
+
+use saphyr_parser::{Event, Marker, Parser, ScalarStyle};
+
+use super::Document;
+use super::document::{Kind, Node};
+use crate::error::{Fault, Place};
+
+/// Deeper than any calibration nests.
+const DEEPEST: usize = 100;
+
+impl Document {
+    /// Parses the first document of a YAML file. `shown` is the name faults call the file by. A key
+    /// without a value counts as absent. `%YAML:1.0`, which OpenCV writes for a directive, is
+    /// understood.
+    ///
+    /// # Errors
+    /// What is not YAML, a key that stands twice, or an alias, with line and column.
+    pub fn parse_yaml(text: &str, shown: &str) -> Result<Self, Fault> {
+        let mut builder = Builder::new(shown);
+        let body = text.strip_prefix('\u{feff}').unwrap_or(text);
+        // The directive is blanked, so that lines keep their numbers.
+        let blanked;
+        let body = match body.strip_prefix("%YAML:") {
+            Some(rest) => {
+                blanked = rest.find('\n').map_or("", |end| &rest[end..]);
+                blanked
+            }
+            None => body,
+        };
+        for event in Parser::new_from_str(body) {
+            let (event, span) = event.map_err(|e| {
+                let place = place(shown, *e.marker());
+                Fault::new(place, "", format!("not YAML: {}", e.info()))
+            })?;
+            if matches!(event, Event::DocumentEnd) {
+                break;
+            }
+            builder.take(event, place(shown, span.start))?;
+        }
+        Ok(Document::of(shown, builder.finish()))
+    }
+}
+
+fn place(shown: &str, marker: Marker) -> Place {
+    Place {
+        file: shown.to_owned(),
+        line: Some(marker.line() as u64),
+        column: Some(marker.col() as u64 + 1),
+    }
+}
+
+/// A table or list that is being filled.
+struct Open {
+    place: Place,
+    kind: Kind,
+    /// The key that waits for its value, in a table.
+    key: Option<(String, Place)>,
+}
+
+struct Builder<'a> {
+    shown: &'a str,
+    open: Vec<Open>,
+    root: Option<Node>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(shown: &'a str) -> Self {
+        Self {
+            shown,
+            open: Vec::new(),
+            root: None,
+        }
+    }
+
+    fn take(&mut self, event: Event<'_>, place: Place) -> Result<(), Fault> {
+        match event {
+            Event::MappingStart(..) => self.begin(place, Kind::Table(Vec::new())),
+            Event::SequenceStart(..) => self.begin(place, Kind::List(Vec::new())),
+            Event::MappingEnd | Event::SequenceEnd => match self.open.pop() {
+                Some(Open { place, kind, .. }) => self.put(Node { place, kind }),
+                None => Ok(()),
+            },
+            Event::Scalar(text, style, ..) => {
+                let kind = match style {
+                    ScalarStyle::Plain => plain(&text),
+                    _ => Kind::Text(text.into_owned()),
+                };
+                self.put(Node { place, kind })
+            }
+            Event::Alias(_) => Err(Fault::found(place, "", "an alias", "a plain value")),
+            _ => Ok(()),
+        }
+    }
+
+    fn begin(&mut self, place: Place, kind: Kind) -> Result<(), Fault> {
+        if let Some(Open {
+            kind: Kind::Table(_),
+            key: None,
+            ..
+        }) = self.open.last()
+        {
+            return Err(Fault::found(place, "", "a key that is no text", "text"));
+        }
+        if self.open.len() >= DEEPEST {
+            let expected = format!("at most {DEEPEST}");
+            return Err(Fault::found(place, "", "more levels than that", expected));
+        }
+        self.open.push(Open {
+            place,
+            kind,
+            key: None,
+        });
+        Ok(())
+    }
+
+    /// Gives a finished value its place in the tree.
+    fn put(&mut self, node: Node) -> Result<(), Fault> {
+        let Some(parent) = self.open.last_mut() else {
+            self.root.get_or_insert(node);
+            return Ok(());
+        };
+        match &mut parent.kind {
+            Kind::List(list) => list.push(node),
+            Kind::Table(entries) => match parent.key.take() {
+                None => {
+                    let key = key_text(node.kind);
+                    if entries.iter().any(|(k, _)| *k == key) {
+                        return Err(Fault::found(node.place, key, "the key twice", "it once"));
+                    }
+                    parent.key = Some((key, node.place));
+                }
+                Some((key, place)) => {
+                    if !matches!(&node.kind, Kind::Other(word) if word == "null") {
+                        let kind = node.kind;
+                        entries.push((key, Node { place, kind }));
+                    }
+                }
+            },
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Node {
+        Node {
+            place: Place::file(self.shown),
+            kind: self.root.map_or(Kind::Table(Vec::new()), |n| n.kind),
+        }
+    }
+}
+
+fn key_text(kind: Kind) -> String {
+    match kind {
+        Kind::Text(text) | Kind::Other(text) => text,
+        Kind::Number(x) => x.to_string(),
+        Kind::Boolean(b) => b.to_string(),
+        Kind::List(_) | Kind::Table(_) => String::new(),
+    }
+}
+
+/// What a scalar without quotes means, by the core schema of YAML 1.2.
+fn plain(text: &str) -> Kind {
+    match text {
+        "" | "~" | "null" | "Null" | "NULL" => return Kind::Other("null".to_owned()),
+        "true" | "True" | "TRUE" => return Kind::Boolean(true),
+        "false" | "False" | "FALSE" => return Kind::Boolean(false),
+        _ => {}
+    }
+    match text.trim_start_matches(['-', '+']).to_lowercase().as_str() {
+        ".inf" => return Kind::Number(f64::INFINITY),
+        ".nan" => return Kind::Number(f64::NAN),
+        _ => {}
+    }
+    let numeric = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E');
+    match text.parse::<f64>() {
+        Ok(number) if text.chars().all(numeric) => Kind::Number(number),
+        _ => Kind::Text(text.to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_know_their_places() {
+        let text = "%YAML:1.0\n---\nname: \"12\"\nsize: 1.e+01\nempty:\nm: !!opencv-matrix\n   rows: 1\n   data: [ 1., .5,\n       -.Inf ]\nflag: true\n---\nname: other\n";
+        let document = Document::parse_yaml(text, "c.yml").unwrap();
+        let root = document.root();
+        assert_eq!(root.text("name").unwrap(), "12");
+        assert_eq!(root.number("size", .., "a number"), Some(10.0));
+        assert!(!root.has("empty"));
+        assert_eq!(root.boolean("flag"), Some(true));
+        let m = root.section("m");
+        assert_eq!(m.numbers("data", &[3]), None);
+        let faults: Vec<String> = document
+            .take_faults()
+            .iter()
+            .map(Fault::to_string)
+            .collect();
+        assert_eq!(
+            faults,
+            ["c.yml:8:4: m.data: found a list of 3, expected a list of 3 finite numbers"]
+        );
+    }
+
+    #[test]
+    fn what_is_not_understood_has_a_place() {
+        let fault = |text: &str| Document::parse_yaml(text, "c.yml").unwrap_err().to_string();
+        assert!(fault("a: [1, 2\nb: 3\n").starts_with("c.yml:"));
+        assert_eq!(
+            fault("a: 1\na: 2\n"),
+            "c.yml:2:1: a: found the key twice, expected it once"
+        );
+        assert_eq!(
+            fault("a: &x 1\nb: *x\n"),
+            "c.yml:2:4: found an alias, expected a plain value"
+        );
+        assert_eq!(
+            fault("? [1]\n: 2\n"),
+            "c.yml:1:3: found a key that is no text, expected text"
+        );
+        assert!(fault(&"[".repeat(200)).contains("more levels than that, expected at most 100"));
+    }
+}
