@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2};
 
-use super::perspective::{direction_of_plane, plane_of_point, product};
+use super::perspective::{
+    direction_by_plane, direction_of_plane, plane_by_point, plane_of_point, product,
+};
 use super::radial::Radial;
 use super::sensor::Sensor;
 use super::{BadLens, Intrinsics, LensError, central_ray};
@@ -87,64 +89,144 @@ impl BrownConrady {
     }
 
     #[inline]
-    pub(super) fn ray(
-        &self,
-        pixel: Pixel,
-    ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
-        let (distorted, distorted_by_pixel) = self.sensor.plane(pixel)?;
-        let (plane, by_distorted) = if self.decentred {
-            self.undistort(distorted)?
+    pub(super) fn ray(&self, pixel: Pixel) -> Result<Ray<frame::Camera>, LensError> {
+        let distorted = self.sensor.plane(pixel)?;
+        let plane = if self.decentred {
+            self.undistort(distorted)?.0
         } else {
             self.radial.undistort(distorted)?
         };
-        let (direction, by_plane) = direction_of_plane(plane);
-        let jacobian = product(&by_plane, &product(&by_distorted, &distorted_by_pixel));
+        Ok(central_ray(direction_of_plane(plane)))
+    }
+
+    #[inline]
+    pub(super) fn ray_with_jacobian(
+        &self,
+        pixel: Pixel,
+    ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
+        let (distorted, distorted_by_pixel) = self.sensor.plane_with_jacobian(pixel)?;
+        let (plane, by_distorted) = if self.decentred {
+            self.undistort(distorted)?
+        } else {
+            self.radial.undistort_with_jacobian(distorted)?
+        };
+        let direction = direction_of_plane(plane);
+        let jacobian = product(
+            &direction_by_plane(direction),
+            &product(&by_distorted, &distorted_by_pixel),
+        );
         Ok((central_ray(direction), jacobian))
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        let plane = plane_of_point(point.xyz)?;
+        let distorted = if self.decentred {
+            self.distort_upright(plane)?.0
+        } else {
+            self.radial.distort(plane)?
+        };
+        self.sensor.pixel(distorted)
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
-        let (plane, by_point) = plane_of_point(point.xyz)?;
-        let (distorted, by_plane) = self.distort(plane)?;
-        let upright = by_plane.determinant() > 0.0;
-        if !upright {
-            return Err(LensError::OutsideField);
-        }
-        let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
+        let plane = plane_of_point(point.xyz)?;
+        let (distorted, by_plane) = self.distort_upright(plane)?;
+        let (pixel, by_distorted) = self.sensor.pixel_with_jacobian(distorted)?;
+        let by_point = plane_by_point(plane, point.xyz.z);
         Ok((
             pixel,
             product(&product(&by_distorted, &by_plane), &by_point),
         ))
     }
 
+    /// As [`Self::distort`] where the map keeps its orientation.
+    #[inline]
+    fn distort_upright(
+        &self,
+        place: Vector2<f64>,
+    ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
+        let (distorted, jacobian) = self.distort(place)?;
+        if determinant(&jacobian) > 0.0 {
+            Ok((distorted, jacobian))
+        } else {
+            Err(LensError::OutsideField)
+        }
+    }
+
     /// The distorted place of a place on the plane at unit depth, and its derivative.
     #[inline]
     fn distort(&self, place: Vector2<f64>) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
-        let (mut distorted, mut jacobian) = self.radial.distort(place)?;
+        let (distorted, jacobian) = self.radial.distort_with_jacobian(place)?;
         if self.decentred {
-            let [p1, p2] = self.tangential;
-            let [s1, s2, s3, s4] = self.prism;
-            let (x, y) = (place.x, place.y);
-            let s = place.norm_squared();
-            distorted.x += 2.0 * p1 * x * y + p2 * (s + 2.0 * x * x) + s * (s1 + s2 * s);
-            distorted.y += p1 * (s + 2.0 * y * y) + 2.0 * p2 * x * y + s * (s3 + s4 * s);
-            let (prism_x, prism_y) = (2.0 * (s1 + 2.0 * s2 * s), 2.0 * (s3 + 2.0 * s4 * s));
-            jacobian += Matrix2::new(
-                2.0 * p1 * y + 6.0 * p2 * x + prism_x * x,
-                2.0 * p1 * x + 2.0 * p2 * y + prism_x * y,
-                2.0 * p1 * x + 2.0 * p2 * y + prism_y * x,
-                6.0 * p1 * y + 2.0 * p2 * x + prism_y * y,
-            );
+            let (shift, bend) = self.decentring(place);
+            Ok((distorted + shift, jacobian + bend))
+        } else {
+            Ok((distorted, jacobian))
         }
-        Ok((distorted, jacobian))
+    }
+
+    /// The tangential and prism terms at a place, and their derivative.
+    #[inline]
+    fn decentring(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let [p1, p2] = self.tangential;
+        let [s1, s2, s3, s4] = self.prism;
+        let (x, y) = (place.x, place.y);
+        let s = place.norm_squared();
+        let shift = Vector2::new(
+            2.0 * p1 * x * y + p2 * (s + 2.0 * x * x) + s * (s1 + s2 * s),
+            p1 * (s + 2.0 * y * y) + 2.0 * p2 * x * y + s * (s3 + s4 * s),
+        );
+        let (prism_x, prism_y) = (2.0 * (s1 + 2.0 * s2 * s), 2.0 * (s3 + 2.0 * s4 * s));
+        let bend = Matrix2::new(
+            2.0 * p1 * y + 6.0 * p2 * x + prism_x * x,
+            2.0 * p1 * x + 2.0 * p2 * y + prism_x * y,
+            2.0 * p1 * x + 2.0 * p2 * y + prism_y * x,
+            6.0 * p1 * y + 2.0 * p2 * x + prism_y * y,
+        );
+        (shift, bend)
+    }
+
+    /// The place whose distorted place is given, and its derivative.
+    #[inline]
+    fn undistort(
+        &self,
+        distorted: Vector2<f64>,
+    ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
+        match self.undistort_nearby(distorted) {
+            Some(found) => Ok(found),
+            None => self.undistort_anywhere(distorted),
+        }
+    }
+
+    /// Up to three steps of Newton's method from where the radial part alone would put the place,
+    /// the decentring there taken off; `None` where they do not suffice.
+    #[inline]
+    fn undistort_nearby(&self, distorted: Vector2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+        let without = self.radial.undistort_roughly(distorted)?;
+        let (shift, _) = self.decentring(without);
+        let mut place = self.radial.undistort_roughly(distorted - shift)?;
+        for _ in 0..3 {
+            let (seen, jacobian) = self.distort(place).ok()?;
+            let inverse = upright_inverse(&jacobian).ok()?;
+            let step = product(&inverse, &(distorted - seen));
+            place += step;
+            if is_last(step, &inverse) {
+                return Some((place, inverse));
+            }
+        }
+        None
     }
 
     /// The place whose distorted place is given, and its derivative: damped Newton steps from where
     /// the radial part alone would put it, never leaving the field.
-    fn undistort(
+    #[cold]
+    #[inline(never)]
+    fn undistort_anywhere(
         &self,
         distorted: Vector2<f64>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
@@ -152,14 +234,10 @@ impl BrownConrady {
         let (seen, mut jacobian) = self.distort(place)?;
         let mut miss = distorted - seen;
         let enough = 4.0 * f64::EPSILON * (1.0 + distorted.norm());
-        // The error of a step is of the order of its square; a hundred covers the curvature.
-        let last = |step: Vector2<f64>, inverse: &Matrix2<f64>| {
-            100.0 * step.norm_squared() * inverse.norm() <= f64::EPSILON
-        };
         for _ in 0..60 {
             let inverse = upright_inverse(&jacobian)?;
             let step = product(&inverse, &miss);
-            if miss.norm() <= enough || last(step, &inverse) {
+            if miss.norm() <= enough || is_last(step, &inverse) {
                 return Ok((place + step, inverse));
             }
             let mut share = 1.0;
@@ -213,10 +291,28 @@ impl BrownConrady {
     }
 }
 
+/// Whether what a Newton step leaves is rounding: its error is of the order of its square, and a
+/// hundred covers the curvature.
+#[inline]
+fn is_last(step: Vector2<f64>, inverse: &Matrix2<f64>) -> bool {
+    let spread = inverse.m11.abs() + inverse.m12.abs() + inverse.m21.abs() + inverse.m22.abs();
+    100.0 * step.norm_squared() * spread <= f64::EPSILON
+}
+
+#[inline]
+fn determinant(m: &Matrix2<f64>) -> f64 {
+    m.m11 * m.m22 - m.m12 * m.m21
+}
+
 /// The inverse of a derivative that keeps its orientation.
+#[inline]
 fn upright_inverse(jacobian: &Matrix2<f64>) -> Result<Matrix2<f64>, LensError> {
-    if jacobian.determinant() > 0.0 {
-        jacobian.try_inverse().ok_or(LensError::OutsideField)
+    let determinant = determinant(jacobian);
+    if determinant > 0.0 {
+        let scale = 1.0 / determinant;
+        let j = jacobian;
+        let [a, b, c, d] = [j.m22, -j.m12, -j.m21, j.m11].map(|x| x * scale);
+        Ok(Matrix2::new(a, b, c, d))
     } else {
         Err(LensError::OutsideField)
     }

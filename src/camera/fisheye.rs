@@ -1,8 +1,13 @@
 //! OpenCV's fisheye model.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Matrix2x3, Matrix3x2};
 
-use super::angle::{angle_of_point, direction_of_angle};
+use super::angle::{
+    angle_of_point, angle_of_point_with_jacobian, direction_of_angle,
+    direction_of_angle_with_jacobian,
+};
 use super::perspective::product;
 use super::radial::Radial;
 use super::sensor::Sensor;
@@ -16,7 +21,7 @@ use crate::frame::{self, Pixel, Point, Ray};
 ///
 /// `theta` is taken from 0 to 180 degrees; points beside and behind the plane of the camera are in
 /// the field where the polynomial still grows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Fisheye {
     intrinsics: Intrinsics,
     distortion: [f64; 4],
@@ -32,9 +37,8 @@ impl Fisheye {
     pub fn new(intrinsics: Intrinsics, distortion: [f64; 4]) -> Result<Self, BadLens> {
         intrinsics.check()?;
         let [k1, k2, k3, k4] = distortion;
-        let radial = Radial::new([1.0, k1, k2, k3, k4], [1.0, 0.0, 0.0, 0.0])
-            .ok_or(BadLens::Distortion)?
-            .limited(std::f64::consts::PI);
+        let radial = Radial::up_to(PI, [1.0, k1, k2, k3, k4], [1.0, 0.0, 0.0, 0.0])
+            .ok_or(BadLens::Distortion)?;
         Ok(Self {
             intrinsics,
             distortion,
@@ -59,25 +63,37 @@ impl Fisheye {
     }
 
     #[inline]
-    pub(super) fn ray(
+    pub(super) fn ray(&self, pixel: Pixel) -> Result<Ray<frame::Camera>, LensError> {
+        let angle = self.radial.undistort(self.sensor.plane(pixel)?)?;
+        Ok(central_ray(direction_of_angle(angle)))
+    }
+
+    #[inline]
+    pub(super) fn ray_with_jacobian(
         &self,
         pixel: Pixel,
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
-        let (distorted, distorted_by_pixel) = self.sensor.plane(pixel)?;
-        let (angle, by_distorted) = self.radial.undistort(distorted)?;
-        let (direction, by_angle) = direction_of_angle(angle);
+        let (distorted, distorted_by_pixel) = self.sensor.plane_with_jacobian(pixel)?;
+        let (angle, by_distorted) = self.radial.undistort_with_jacobian(distorted)?;
+        let (direction, by_angle) = direction_of_angle_with_jacobian(angle);
         let jacobian = product(&by_angle, &product(&by_distorted, &distorted_by_pixel));
         Ok((central_ray(direction), jacobian))
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        let angle = angle_of_point(point.xyz)?;
+        self.sensor.pixel(self.radial.distort(angle)?)
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
-        let (angle, by_point) = angle_of_point(point.xyz)?;
-        let (distorted, by_angle) = self.radial.distort(angle)?;
-        let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
+        let (angle, by_point) = angle_of_point_with_jacobian(point.xyz)?;
+        let (distorted, by_angle) = self.radial.distort_with_jacobian(angle)?;
+        let (pixel, by_distorted) = self.sensor.pixel_with_jacobian(distorted)?;
         Ok((
             pixel,
             product(&product(&by_distorted, &by_angle), &by_point),

@@ -3,13 +3,14 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::LensError;
+use super::inverse::InverseTable;
 use super::polynomial::{derivative, difference, evaluate, first_positive_root, product};
 
 /// `r_d = r N(r^2) / D(r^2)`: the radial part of every lens model here.
 ///
 /// It is used up to the smallest radius at which `r_d` stops growing (or the denominator vanishes):
 /// beyond it a point outside the field would fold back into the picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Radial {
     numerator: [f64; 5],
     denominator: [f64; 4],
@@ -19,12 +20,23 @@ pub(super) struct Radial {
     limit: f64,
     /// The distorted radius at the limit.
     distorted_limit: f64,
+    /// Where Newton's method for the inverse starts.
+    inverse: InverseTable,
 }
+
+/// The table of the inverse ends at this undistorted radius at the latest: 86 degrees from the axis
+/// at unit depth.
+const TABLE_RADIUS: f64 = 14.0;
 
 impl Radial {
     /// From the coefficients of N and D in powers of `r^2`; `None` where the distorted radius does
     /// not grow with the radius at the centre, or a coefficient is not finite.
     pub(super) fn new(numerator: [f64; 5], denominator: [f64; 4]) -> Option<Self> {
+        Self::up_to(f64::INFINITY, numerator, denominator)
+    }
+
+    /// As [`Radial::new`], for radii up to `most` only.
+    pub(super) fn up_to(most: f64, numerator: [f64; 5], denominator: [f64; 4]) -> Option<Self> {
         let all = || numerator.iter().chain(&denominator);
         if !all().all(|c| c.is_finite()) || numerator[0] <= 0.0 || denominator[0] <= 0.0 {
             return None;
@@ -51,13 +63,15 @@ impl Radial {
                 polynomial: denominator == [1.0, 0.0, 0.0, 0.0],
                 limit: f64::INFINITY,
                 distorted_limit: f64::INFINITY,
+                inverse: InverseTable::empty(),
             }
-            .limited(limit.sqrt()),
+            .limited(limit.sqrt().min(most))
+            .tabulated(),
         )
     }
 
     /// The same map, used up to `limit` at most.
-    pub(super) fn limited(mut self, limit: f64) -> Self {
+    fn limited(mut self, limit: f64) -> Self {
         if limit < self.limit {
             self.limit = limit;
             let (factor, _) = self.factor(limit * limit);
@@ -68,6 +82,19 @@ impl Radial {
                 f64::INFINITY
             };
         }
+        self
+    }
+
+    /// The same map with the table of its inverse.
+    fn tabulated(mut self) -> Self {
+        // At the limit itself the inverse has no slope.
+        let end = TABLE_RADIUS.min(0.9999 * self.limit);
+        let distorted = end * self.factor(end * end).0;
+        self.inverse = InverseTable::new(distorted * distorted, |q| {
+            let ratio = self.searched_ratio(q).ok()?;
+            let (_, slope) = self.ratio_slope(ratio, q).ok()?;
+            Some((ratio, slope))
+        });
         self
     }
 
@@ -88,12 +115,23 @@ impl Radial {
         (factor, (n_slope - factor * d_slope) / d)
     }
 
-    /// The distorted place of a place, and its derivative.
+    /// The distorted place of a place.
     ///
     /// # Errors
     /// [`LensError::OutsideField`] beyond the radius of use.
     #[inline]
-    pub(super) fn distort(
+    pub(super) fn distort(&self, place: Vector2<f64>) -> Result<Vector2<f64>, LensError> {
+        let s = place.norm_squared();
+        if s < self.limit * self.limit {
+            Ok(place * self.factor(s).0)
+        } else {
+            Err(LensError::OutsideField)
+        }
+    }
+
+    /// As [`Radial::distort`], with the derivative.
+    #[inline]
+    pub(super) fn distort_with_jacobian(
         &self,
         place: Vector2<f64>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
@@ -103,39 +141,91 @@ impl Radial {
             return Err(LensError::OutsideField);
         }
         let (factor, slope) = self.factor(s);
-        let bend = place * (2.0 * slope);
-        let jacobian = Matrix2::new(
-            factor + place.x * bend.x,
-            place.x * bend.y,
-            place.y * bend.x,
-            factor + place.y * bend.y,
-        );
-        Ok((place * factor, jacobian))
+        Ok((place * factor, scaling_jacobian(place, factor, slope)))
     }
 
-    /// The place whose distorted place is given, and its derivative.
+    /// The place whose distorted place is given.
     ///
     /// # Errors
     /// [`LensError::OutsideField`] where no place within the radius of use is distorted to it.
     #[inline]
-    pub(super) fn undistort(
+    pub(super) fn undistort(&self, distorted: Vector2<f64>) -> Result<Vector2<f64>, LensError> {
+        Ok(distorted * self.ratio(distorted.norm_squared())?)
+    }
+
+    /// As [`Radial::undistort`], with the derivative.
+    #[inline]
+    pub(super) fn undistort_with_jacobian(
         &self,
         distorted: Vector2<f64>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
-        let distorted_radius = distorted.norm();
-        let radius = self.radius(distorted_radius, 4.0 * f64::EPSILON)?;
-        let (factor, slope) = self.factor(radius * radius);
-        let growth = factor + 2.0 * radius * radius * slope;
-        if growth <= 0.0 {
-            return Err(LensError::OutsideField);
+        let q = distorted.norm_squared();
+        let (ratio, slope) = self.ratio_slope(self.ratio(q)?, q)?;
+        let jacobian = scaling_jacobian(distorted, ratio, slope);
+        Ok((distorted * ratio, jacobian))
+    }
+
+    /// About the place that the inverse table gives, within some millionths; `None` beyond it.
+    #[inline]
+    pub(super) fn undistort_roughly(&self, distorted: Vector2<f64>) -> Option<Vector2<f64>> {
+        let ratio = self.inverse.ratio(distorted.norm_squared())?;
+        Some(distorted * ratio)
+    }
+
+    /// The undistorted radius over the distorted one, whose square is `q`.
+    #[inline]
+    fn ratio(&self, q: f64) -> Result<f64, LensError> {
+        let near = self.inverse.ratio(q);
+        match near.and_then(|near| self.polished_ratio(near, q)) {
+            Some(ratio) => Ok(ratio),
+            None => self.searched_ratio(q),
         }
-        let unit = if distorted_radius > 0.0 {
-            distorted / distorted_radius
+    }
+
+    /// The root of `g factor(g^2 q) - 1` next to `near`, by one or two steps of Newton's method;
+    /// `None` where they do not suffice, or lead out of the radius of use.
+    #[inline(always)]
+    fn polished_ratio(&self, near: f64, q: f64) -> Option<f64> {
+        let mut ratio = near;
+        for _ in 0..2 {
+            let s = ratio * ratio * q;
+            let (factor, slope) = self.factor(s);
+            let growth = factor + 2.0 * s * slope;
+            let step = (1.0 - ratio * factor) / growth;
+            ratio += step;
+            // One at the centre, zero at the limit, where the map has no inverse.
+            let slack = growth * ratio;
+            // The error of a step is of the order of its square; a hundred covers the curvature.
+            if 100.0 * step * step <= f64::EPSILON * slack * ratio * ratio {
+                let inside = ratio * ratio * q < self.limit * self.limit;
+                return (inside && slack > 1e-6).then_some(ratio);
+            }
+        }
+        None
+    }
+
+    /// The same wherever it is, by a search that cannot fail.
+    #[cold]
+    #[inline(never)]
+    fn searched_ratio(&self, q: f64) -> Result<f64, LensError> {
+        if q == 0.0 {
+            return Ok(1.0 / self.factor(0.0).0);
+        }
+        let distorted = q.sqrt();
+        Ok(self.radius(distorted, 4.0 * f64::EPSILON)? / distorted)
+    }
+
+    /// The ratio, with its derivative by `q`: `g factor(g^2 q) = 1` differentiated.
+    #[inline]
+    fn ratio_slope(&self, ratio: f64, q: f64) -> Result<(f64, f64), LensError> {
+        let s = ratio * ratio * q;
+        let (factor, slope) = self.factor(s);
+        let growth = factor + 2.0 * s * slope;
+        if growth > 0.0 {
+            Ok((ratio, -ratio * ratio * ratio * slope / growth))
         } else {
-            Vector2::x()
-        };
-        let jacobian = super::perspective::radial_jacobian(unit, 1.0 / growth, 1.0 / factor);
-        Ok((unit * radius, jacobian))
+            Err(LensError::OutsideField)
+        }
     }
 
     /// The radius that is distorted to `distorted`, but for a share `tolerance` of that.
@@ -178,6 +268,19 @@ impl Radial {
         }
         None
     }
+}
+
+/// The derivative of `place * factor(|place|^2)` by the place.
+#[inline(always)]
+fn scaling_jacobian(place: Vector2<f64>, factor: f64, slope: f64) -> Matrix2<f64> {
+    let bend = place * (2.0 * slope);
+    let mixed = place.x * bend.y;
+    Matrix2::new(
+        factor + place.x * bend.x,
+        mixed,
+        mixed,
+        factor + place.y * bend.y,
+    )
 }
 
 /// The root in [0, `high`] of an increasing function that gives its value and slope, by Newton's

@@ -31,6 +31,7 @@ fn camera() -> Camera {
         height: 960,
         lens: Lens::Pinhole(Pinhole::new(intrinsics).unwrap()),
         mount: Mount::new(Vector::new(0.3, -0.1, 1.8), [0.5, -0.5, 0.5, -0.5]).unwrap(),
+        readout: None,
     }
 }
 

@@ -173,5 +173,6 @@ fn camera(lens: Lens) -> Camera {
         height: 480,
         lens,
         mount: Mount::default(),
+        readout: None,
     }
 }
