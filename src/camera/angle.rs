@@ -22,7 +22,13 @@ pub(super) fn angle_of_point(point: Vector3<f64>) -> Result<Vector2<f64>, LensEr
     if across == 0.0 {
         return Ok(Vector2::zeros());
     }
-    Ok(point.xy() * (across.atan2(point.z) / across))
+    // Half as long as the arctangent of two arguments.
+    let theta = if point.z > 0.0 {
+        (across / point.z).atan()
+    } else {
+        across.atan2(point.z)
+    };
+    Ok(point.xy() * (theta / across))
 }
 
 /// As [`angle_of_point`], with the derivative by the point.

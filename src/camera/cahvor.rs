@@ -1,8 +1,9 @@
 //! JPL's camera model with radial distortion.
 
-use nalgebra::{Matrix2x3, Matrix3x2};
+use nalgebra::{Matrix2x3, Matrix3x2, Vector3};
 
 use super::cahv::OpticalAxis;
+use super::lanes::Central;
 use super::perspective::{
     direction_by_plane, direction_of_plane, plane_by_point, plane_of_point, product,
 };
@@ -65,14 +66,6 @@ impl Cahvor {
     }
 
     #[inline]
-    pub(super) fn ray(&self, pixel: Pixel) -> Result<Ray<frame::Camera>, LensError> {
-        let plane = self.radial.undistort(self.sensor.plane(pixel)?)?;
-        let direction = direction_of_plane(plane);
-        let turn = self.optical.lens_from_camera.transpose();
-        Ok(central_ray(product(&turn, &direction)))
-    }
-
-    #[inline]
     pub(super) fn ray_with_jacobian(
         &self,
         pixel: Pixel,
@@ -111,6 +104,21 @@ impl Cahvor {
                 &product(&plane_by_point(plane, in_lens.z), &turn),
             ),
         ))
+    }
+}
+
+impl Central for Cahvor {
+    #[inline(always)]
+    fn directions<const N: usize>(&self, pixels: &[Pixel; N]) -> [Vector3<f64>; N] {
+        let planes = self.radial.undistort_nearby(&self.sensor.planes(pixels));
+        let turn = self.optical.lens_from_camera.transpose();
+        planes.directions().map(|unit| product(&turn, &unit))
+    }
+
+    fn searched_direction(&self, pixel: Pixel) -> Result<Vector3<f64>, LensError> {
+        let plane = self.radial.undistort(self.sensor.plane(pixel)?)?;
+        let turn = self.optical.lens_from_camera.transpose();
+        Ok(product(&turn, &direction_of_plane(plane)))
     }
 }
 

@@ -2,12 +2,13 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix2x3, Matrix3x2};
+use nalgebra::{Matrix2x3, Matrix3x2, Vector3};
 
 use super::angle::{
     angle_of_point, angle_of_point_with_jacobian, direction_of_angle,
     direction_of_angle_with_jacobian,
 };
+use super::lanes::Central;
 use super::perspective::product;
 use super::radial::Radial;
 use super::sensor::Sensor;
@@ -63,12 +64,6 @@ impl Fisheye {
     }
 
     #[inline]
-    pub(super) fn ray(&self, pixel: Pixel) -> Result<Ray<frame::Camera>, LensError> {
-        let angle = self.radial.undistort(self.sensor.plane(pixel)?)?;
-        Ok(central_ray(direction_of_angle(angle)))
-    }
-
-    #[inline]
     pub(super) fn ray_with_jacobian(
         &self,
         pixel: Pixel,
@@ -98,5 +93,18 @@ impl Fisheye {
             pixel,
             product(&product(&by_distorted, &by_angle), &by_point),
         ))
+    }
+}
+
+impl Central for Fisheye {
+    #[inline(always)]
+    fn directions<const N: usize>(&self, pixels: &[Pixel; N]) -> [Vector3<f64>; N] {
+        let angles = self.radial.undistort_nearby(&self.sensor.planes(pixels));
+        std::array::from_fn(|i| direction_of_angle(angles.get(i)))
+    }
+
+    fn searched_direction(&self, pixel: Pixel) -> Result<Vector3<f64>, LensError> {
+        let angle = self.radial.undistort(self.sensor.plane(pixel)?)?;
+        Ok(direction_of_angle(angle))
     }
 }

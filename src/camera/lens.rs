@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Vector2, Vector3};
 
+use super::lanes::Central;
 use super::{BrownConrady, Cahv, Cahvor, Cahvore, Equirectangular, Fisheye, Pinhole};
 use crate::frame::{self, Direction, Pixel, Point, Ray};
 
@@ -108,17 +109,29 @@ impl Lens {
         by_model!(self, lens => lens.ray(pixel))
     }
 
-    /// The rays of pixels, in order, as many as fit.
+    /// The rays of pixels, in order, as many as fit; `on_sensor` takes a pixel to the sensor.
     pub(super) fn rays(
         &self,
-        pixels: impl Iterator<Item = Pixel>,
+        pixels: &[Pixel],
+        on_sensor: impl Fn(Pixel) -> Pixel,
         rays: &mut [Result<Ray<frame::Camera>, LensError>],
     ) {
-        by_model!(self, lens => {
-            for (ray, pixel) in rays.iter_mut().zip(pixels) {
-                *ray = lens.ray(pixel);
-            }
-        });
+        macro_rules! one_by_one {
+            ($lens:expr) => {
+                for (ray, &pixel) in rays.iter_mut().zip(pixels) {
+                    *ray = $lens.ray(on_sensor(pixel));
+                }
+            };
+        }
+        match self {
+            Self::BrownConrady(lens) => lens.rays(pixels, on_sensor, rays),
+            Self::Fisheye(lens) => lens.rays(pixels, on_sensor, rays),
+            Self::Cahvor(lens) => lens.rays(pixels, on_sensor, rays),
+            Self::Pinhole(lens) => one_by_one!(lens),
+            Self::Equirectangular(lens) => one_by_one!(lens),
+            Self::Cahv(lens) => one_by_one!(lens),
+            Self::Cahvore(lens) => one_by_one!(lens),
+        }
     }
 
     #[inline]

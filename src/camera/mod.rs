@@ -10,10 +10,13 @@ mod brown_conrady;
 mod cahv;
 mod cahvor;
 mod cahvore;
+mod convert;
 mod equirectangular;
 mod fisheye;
 mod inverse;
+mod lanes;
 mod lens;
+mod list;
 mod mount;
 mod perspective;
 mod pinhole;
@@ -34,9 +37,11 @@ pub use brown_conrady::BrownConrady;
 pub use cahv::{BodyAxes, Cahv, CahvVectors};
 pub use cahvor::Cahvor;
 pub use cahvore::{Cahvore, Linearity};
+pub use convert::{Axes, Conversion, Converted, pixels_of_table, rays_of_table};
 pub use equirectangular::Equirectangular;
 pub use fisheye::Fisheye;
 pub use lens::{BadLens, Lens, LensError, RayJacobian};
+pub use list::{cameras_as_json, cameras_as_text, find_camera};
 pub use mount::{Mount, PanTilt};
 pub use pinhole::{Intrinsics, Pinhole};
 pub(crate) use read::camera as read_camera;
@@ -99,10 +104,11 @@ impl Camera {
     ///
     /// Of slices of two lengths, what the longer has beyond the shorter is left alone.
     pub fn rays(&self, pixels: &[Pixel], rays: &mut [Result<Ray<frame::Camera>, LensError>]) {
-        let pixels = pixels.iter();
         match &self.readout {
-            None => self.lens.rays(pixels.copied(), rays),
-            Some(readout) => self.lens.rays(pixels.map(|p| readout.on_sensor(*p)), rays),
+            None => self.lens.rays(pixels, |pixel| pixel, rays),
+            Some(readout) => self
+                .lens
+                .rays(pixels, |pixel| readout.on_sensor(pixel), rays),
         }
     }
 

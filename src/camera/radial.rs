@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::LensError;
 use super::inverse::InverseTable;
+use super::lanes::Places;
 use super::polynomial::{derivative, difference, evaluate, first_positive_root, product};
 
 /// `r_d = r N(r^2) / D(r^2)`: the radial part of every lens model here.
@@ -121,9 +122,8 @@ impl Radial {
     /// [`LensError::OutsideField`] beyond the radius of use.
     #[inline]
     pub(super) fn distort(&self, place: Vector2<f64>) -> Result<Vector2<f64>, LensError> {
-        let s = place.norm_squared();
-        if s < self.limit * self.limit {
-            Ok(place * self.factor(s).0)
+        if self.is_inside(place) {
+            Ok(place * self.factor(place.norm_squared()).0)
         } else {
             Err(LensError::OutsideField)
         }
@@ -135,16 +135,27 @@ impl Radial {
         &self,
         place: Vector2<f64>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
-        let s = place.norm_squared();
-        let inside = s < self.limit * self.limit;
-        if !inside {
-            return Err(LensError::OutsideField);
+        if self.is_inside(place) {
+            Ok(self.distort_unbounded(place))
+        } else {
+            Err(LensError::OutsideField)
         }
-        let (factor, slope) = self.factor(s);
-        Ok((place * factor, scaling_jacobian(place, factor, slope)))
     }
 
-    /// The place whose distorted place is given.
+    /// As [`Radial::distort_with_jacobian`], within the radius of use or not.
+    #[inline(always)]
+    pub(super) fn distort_unbounded(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let (factor, slope) = self.factor(place.norm_squared());
+        (place * factor, scaling_jacobian(place, factor, slope))
+    }
+
+    /// Whether a place is within the radius of use.
+    #[inline(always)]
+    pub(super) fn is_inside(&self, place: Vector2<f64>) -> bool {
+        place.norm_squared() < self.limit * self.limit
+    }
+
+    /// The place whose distorted place is given, wherever it is.
     ///
     /// # Errors
     /// [`LensError::OutsideField`] where no place within the radius of use is distorted to it.
@@ -165,43 +176,65 @@ impl Radial {
         Ok((distorted * ratio, jacobian))
     }
 
-    /// About the place that the inverse table gives, within some millionths; `None` beyond it.
-    #[inline]
-    pub(super) fn undistort_roughly(&self, distorted: Vector2<f64>) -> Option<Vector2<f64>> {
-        let ratio = self.inverse.ratio(distorted.norm_squared())?;
-        Some(distorted * ratio)
+    /// The same but for a billionth or so.
+    #[inline(always)]
+    pub(super) fn undistort_roughly<const N: usize>(&self, distorted: &Places<N>) -> Places<N> {
+        let q: [f64; N] = std::array::from_fn(|i| distorted.get(i).norm_squared());
+        let ratios = q.map(|q| self.inverse.ratio(q));
+        Places::from_fn(|i| distorted.get(i) * ratios[i])
+    }
+
+    /// The places whose distorted places are given, by the short way.
+    #[inline(always)]
+    pub(super) fn undistort_nearby<const N: usize>(&self, distorted: &Places<N>) -> Places<N> {
+        let q: [f64; N] = std::array::from_fn(|i| distorted.get(i).norm_squared());
+        let ratios = self.nearby_ratios(&q);
+        Places::from_fn(|i| distorted.get(i) * ratios[i])
     }
 
     /// The undistorted radius over the distorted one, whose square is `q`.
     #[inline]
     fn ratio(&self, q: f64) -> Result<f64, LensError> {
-        let near = self.inverse.ratio(q);
-        match near.and_then(|near| self.polished_ratio(near, q)) {
-            Some(ratio) => Ok(ratio),
-            None => self.searched_ratio(q),
+        let [ratio] = self.nearby_ratios(&[q]);
+        if ratio.is_nan() {
+            self.searched_ratio(q)
+        } else {
+            Ok(ratio)
         }
     }
 
-    /// The root of `g factor(g^2 q) - 1` next to `near`, by one or two steps of Newton's method;
-    /// `None` where they do not suffice, or lead out of the radius of use.
+    /// The roots of `g factor(g^2 q) - 1` next to the table's, by one step of Newton's method, or by
+    /// two; not numbers where these do not suffice, or lead out of the radius of use.
     #[inline(always)]
-    fn polished_ratio(&self, near: f64, q: f64) -> Option<f64> {
-        let mut ratio = near;
-        for _ in 0..2 {
-            let s = ratio * ratio * q;
-            let (factor, slope) = self.factor(s);
-            let growth = factor + 2.0 * s * slope;
-            let step = (1.0 - ratio * factor) / growth;
-            ratio += step;
-            // One at the centre, zero at the limit, where the map has no inverse.
-            let slack = growth * ratio;
-            // The error of a step is of the order of its square; a hundred covers the curvature.
-            if 100.0 * step * step <= f64::EPSILON * slack * ratio * ratio {
-                let inside = ratio * ratio * q < self.limit * self.limit;
-                return (inside && slack > 1e-6).then_some(ratio);
+    fn nearby_ratios<const N: usize>(&self, q: &[f64; N]) -> [f64; N] {
+        let mut ratios = q.map(|q| self.inverse.ratio(q));
+        let mut settled = [false; N];
+        for i in 0..N {
+            (ratios[i], settled[i]) = self.polished_ratio(ratios[i], q[i]);
+        }
+        for i in 0..N {
+            if !settled[i] {
+                let (ratio, is_settled) = self.polished_ratio(ratios[i], q[i]);
+                ratios[i] = if is_settled { ratio } else { f64::NAN };
             }
         }
-        None
+        ratios
+    }
+
+    /// One step of Newton's method, and whether it was the last that is needed.
+    #[inline(always)]
+    fn polished_ratio(&self, near: f64, q: f64) -> (f64, bool) {
+        let s = near * near * q;
+        let (factor, slope) = self.factor(s);
+        let growth = factor + 2.0 * s * slope;
+        let step = (1.0 - near * factor) / growth;
+        let ratio = near + step;
+        // One at the centre, zero at the limit, where the map has no inverse.
+        let slack = growth * ratio;
+        // The error of a step is of the order of its square; a hundred covers the curvature.
+        let small = 100.0 * step * step <= f64::EPSILON * slack * ratio * ratio;
+        let inside = ratio * ratio * q < self.limit * self.limit;
+        (ratio, small & inside & (slack > 1e-6))
     }
 
     /// The same wherever it is, by a search that cannot fail.

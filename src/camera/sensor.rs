@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, RowVector3, Vector2};
 
+use super::lanes::Places;
 use super::perspective::{
     direction_by_plane, direction_of_plane, plane_by_point, plane_of_point, product,
 };
@@ -71,6 +72,23 @@ impl Sensor {
     pub(super) fn plane(&self, pixel: Pixel) -> Result<Vector2<f64>, LensError> {
         self.transfer(&self.plane_from_pixel, pixel.to_vector())
             .ok_or(LensError::OutsideField)
+    }
+
+    /// The places on the distorted plane that pixels show; not numbers where there is none.
+    #[inline(always)]
+    pub(super) fn planes<const N: usize>(&self, pixels: &[Pixel; N]) -> Places<N> {
+        let m = &self.plane_from_pixel;
+        Places::from_fn(|i| {
+            let Pixel { u, v } = pixels[i];
+            let x = m.m11 * u + m.m12 * v + m.m13;
+            let y = m.m21 * u + m.m22 * v + m.m23;
+            if self.is_affine {
+                return Vector2::new(x, y);
+            }
+            let depth = m.m31 * u + m.m32 * v + m.m33;
+            let scale = if depth > 0.0 { 1.0 / depth } else { f64::NAN };
+            Vector2::new(x, y) * scale
+        })
     }
 
     /// As [`Sensor::plane`], with the derivative.
