@@ -260,22 +260,32 @@ impl Cahvore {
             return Ok(0.0);
         }
         let equation = |theta: f64| self.pupil_equation(theta, lambda, zeta);
-        if equation(self.field_angle).0 <= 0.0 {
+        let start = lambda.atan2(zeta);
+        let Some(high) = self.beyond_root(equation, start) else {
             let behind = zeta <= 0.0 && self.field_angle <= FRAC_PI_2;
             return Err(if behind {
                 LensError::BehindCamera
             } else {
                 LensError::OutsideField
             });
+        };
+        increasing_root(equation, high, start, 2.0 * f64::EPSILON * distance)
+            .ok_or(LensError::NoConvergence)
+    }
+
+    /// An angle at which the equation is above zero: the field's end, or, where a pupil that moves
+    /// far has already turned a near point's equation back there, one on the way to it.
+    fn beyond_root(&self, equation: impl Fn(f64) -> (f64, f64), start: f64) -> Option<f64> {
+        let end = self.field_angle;
+        let above = |theta: &f64| equation(*theta).0 > 0.0;
+        if above(&end) {
+            return Some(end);
         }
-        let start = lambda.atan2(zeta);
-        increasing_root(
-            equation,
-            self.field_angle,
-            start,
-            2.0 * f64::EPSILON * distance,
-        )
-        .ok_or(LensError::NoConvergence)
+        const STEPS: u32 = 32;
+        (0..STEPS)
+            .map(|i| start + (end - start) * f64::from(i) / f64::from(STEPS))
+            .take_while(|_| start < end)
+            .find(above)
     }
 
     /// `zeta sin theta - lambda cos theta - (theta - sin theta) E(theta)`, which is zero at the angle

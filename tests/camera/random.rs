@@ -86,7 +86,9 @@ fn vectors() -> impl Strategy<Value = CahvVectors> {
             };
             let right = forward.cross(&beside).normalize();
             let down = forward.cross(&right);
-            let f = k.fx.max(300.0);
+            // Corners of fisheyes up to some 110 degrees from the axis: beyond, a pupil that moves far
+            // sees near points twice.
+            let f = k.fx.max(450.0);
             CahvVectors {
                 axes: if frd { BodyAxes::Frd } else { BodyAxes::Flu },
                 centre: centre.try_into().unwrap(),
