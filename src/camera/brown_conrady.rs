@@ -220,12 +220,10 @@ impl BrownConrady {
             place
         });
         // Strong decentring takes another two steps.
-        for i in 0..N {
-            if !settled[i] {
-                let (place, is_settled) = self.polished(near.get(i), distorted.get(i));
-                let nowhere = Vector2::repeat(f64::NAN);
-                near.set(i, if is_settled { place } else { nowhere });
-            }
+        for (i, _) in settled.iter().enumerate().filter(|(_, s)| !**s) {
+            let (place, is_settled) = self.polished(near.get(i), distorted.get(i));
+            let nowhere = Vector2::repeat(f64::NAN);
+            near.set(i, if is_settled { place } else { nowhere });
         }
         near
     }

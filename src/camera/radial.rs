@@ -212,11 +212,9 @@ impl Radial {
         for i in 0..N {
             (ratios[i], settled[i]) = self.polished_ratio(ratios[i], q[i]);
         }
-        for i in 0..N {
-            if !settled[i] {
-                let (ratio, is_settled) = self.polished_ratio(ratios[i], q[i]);
-                ratios[i] = if is_settled { ratio } else { f64::NAN };
-            }
+        for (i, _) in settled.iter().enumerate().filter(|(_, s)| !**s) {
+            let (ratio, is_settled) = self.polished_ratio(ratios[i], q[i]);
+            ratios[i] = if is_settled { ratio } else { f64::NAN };
         }
         ratios
     }

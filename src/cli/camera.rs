@@ -20,9 +20,9 @@ pub(super) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Question {
-    /// The rays of pixels: u_px, v_px in, origins and unit directions out
+    /// The rays of pixels: a table of pixels in, one of origins and unit directions out
     Rays(TableArgs),
-    /// The pixels of points: x_m, y_m, z_m in, u_px, v_px out
+    /// The pixels of points: a table of points in, one of raw pixels out
     Pixels(TableArgs),
     /// The cameras of a file: name, model, size, horizontal field of view
     List(ListArgs),

@@ -11,8 +11,11 @@ const PART: Subframe = Subframe {
     height: 200,
 };
 
+/// Where on the sensor a column and row of the picture are.
+type OnSensor = fn(f64, f64) -> (f64, f64);
+
 /// A few readouts of a camera, each with its column and row on the sensor for a pixel, by hand.
-fn readouts(camera: &Camera) -> Vec<(Camera, fn(f64, f64) -> (f64, f64))> {
+fn readouts(camera: &Camera) -> Vec<(Camera, OnSensor)> {
     let part = camera.subframe(PART).unwrap();
     vec![
         (part.clone(), |u, v| (u + 120.0, v + 60.0)),
