@@ -23,6 +23,7 @@ mod pinhole;
 mod polynomial;
 mod radial;
 mod read;
+mod read_readout;
 mod readout;
 mod sensor;
 mod write;
