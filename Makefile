@@ -57,8 +57,10 @@ lint: deps tools ## Check format, lints and licences
 	$(CARGO) clippy --release --all-targets -- -D warnings
 	"$(TOOLS)/bin/cargo-deny" check --hide-inclusion-graph licenses bans sources
 
-bench: deps ## Run the benchmarks
+bench: deps ## Run the benchmarks, and the cameras beside OpenCV where Python has it
 	$(CARGO) bench
+	@if python3 -c 'import cv2, tomllib' 2>/dev/null; then python3 benches/camera.py; \
+	else echo 'no comparison with OpenCV: python3 has no cv2 (pip install opencv-python-headless)'; fi
 
 docs: deps tools ## Build the book into docs/book and the library's reference
 	"$(TOOLS)/bin/mdbook" build docs

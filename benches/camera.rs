@@ -21,6 +21,8 @@ fn lenses(criterion: &mut Criterion) {
             points.len(),
             "{name} has a ray for every pixel"
         );
+        let mut rays: Vec<_> = pixels.iter().map(|&pixel| camera.ray(pixel)).collect();
+        let mut seen: Vec<_> = points.iter().map(|&point| camera.pixel(point)).collect();
         group.throughput(Throughput::Elements(pixels.len() as u64));
         group.bench_function(format!("{name}/ray"), |b| {
             b.iter(|| {
@@ -35,6 +37,12 @@ fn lenses(criterion: &mut Criterion) {
                     let _ = black_box(camera.pixel(black_box(point)));
                 }
             });
+        });
+        group.bench_function(format!("{name}/rays"), |b| {
+            b.iter(|| camera.rays(black_box(&pixels), black_box(&mut rays)));
+        });
+        group.bench_function(format!("{name}/pixels"), |b| {
+            b.iter(|| camera.pixels(black_box(&points), black_box(&mut seen)));
         });
         group.bench_function(format!("{name}/ray_with_jacobian"), |b| {
             b.iter(|| {

@@ -104,6 +104,7 @@ fn view(terrain: &Terrain) -> View {
         height: 960,
         lens: Lens::Pinhole(Pinhole::new(intrinsics).expect("a lens")),
         mount: Mount::new(Vector::new(0.2, 0.0, 1.8), [0.5, -0.5, 0.5, -0.5]).expect("a mount"),
+        readout: None,
     };
     let down = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.26, 0.4);
     View {

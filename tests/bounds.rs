@@ -105,6 +105,7 @@ impl Scene {
             height,
             lens: Lens::Pinhole(pinhole),
             mount: Mount::default(),
+            readout: None,
         });
         let poses = self.position.iter().zip(&self.quaternion);
         poses

@@ -71,14 +71,22 @@ fn every_subcommand_and_option_is_documented() {
     );
     for command in &commands {
         assert!(page.contains(&format!("## rockmap {command}")), "{command}");
-        for word in help(&[command.as_str(), "--help"]).split_whitespace() {
+    }
+    let mut paths: Vec<Vec<&str>> = commands.iter().map(|c| vec![c.as_str()]).collect();
+    for question in ["rays", "pixels", "list"] {
+        assert!(page.contains(&format!("`rockmap camera {question} FILE`")));
+        paths.push(vec!["camera", question]);
+    }
+    for command in &paths {
+        let arguments: Vec<&str> = command.iter().copied().chain(["--help"]).collect();
+        for word in help(&arguments).split_whitespace() {
             if let Some(option) = word.strip_prefix("--")
                 && option.len() > 2
                 && option != "help"
             {
                 assert!(
                     page.contains(&format!("--{option}")),
-                    "{command} --{option}"
+                    "{command:?} --{option}"
                 );
             }
         }

@@ -1,8 +1,11 @@
 //! OpenCV's standard distortion model, in full.
 
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2, Vector3};
 
-use super::perspective::{direction_of_plane, plane_of_point, product};
+use super::lanes::{Central, Places};
+use super::perspective::{
+    direction_by_plane, direction_of_plane, plane_by_point, plane_of_point, product,
+};
 use super::radial::Radial;
 use super::sensor::Sensor;
 use super::{BadLens, Intrinsics, LensError, central_ray};
@@ -30,6 +33,7 @@ pub struct BrownConrady {
     tangential: [f64; 2],
     /// s1, s2, s3, s4.
     prism: [f64; 4],
+    has_prism: bool,
     /// Whether tangential or prism terms are there at all.
     decentred: bool,
     sensor: Sensor,
@@ -65,6 +69,7 @@ impl BrownConrady {
             radial,
             tangential: [p1, p2],
             prism: [s1, s2, s3, s4],
+            has_prism: [s1, s2, s3, s4].iter().any(|&c| c != 0.0),
             decentred: [p1, p2, s1, s2, s3, s4].iter().any(|&c| c != 0.0),
             sensor: Sensor::new(sensor).ok_or(BadLens::Singular)?,
         })
@@ -87,64 +92,172 @@ impl BrownConrady {
     }
 
     #[inline]
-    pub(super) fn ray(
+    pub(super) fn ray_with_jacobian(
         &self,
         pixel: Pixel,
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
-        let (distorted, distorted_by_pixel) = self.sensor.plane(pixel)?;
+        let (distorted, distorted_by_pixel) = self.sensor.plane_with_jacobian(pixel)?;
         let (plane, by_distorted) = if self.decentred {
             self.undistort(distorted)?
         } else {
-            self.radial.undistort(distorted)?
+            self.radial.undistort_with_jacobian(distorted)?
         };
-        let (direction, by_plane) = direction_of_plane(plane);
-        let jacobian = product(&by_plane, &product(&by_distorted, &distorted_by_pixel));
+        let direction = direction_of_plane(plane);
+        let jacobian = product(
+            &direction_by_plane(direction),
+            &product(&by_distorted, &distorted_by_pixel),
+        );
         Ok((central_ray(direction), jacobian))
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        let plane = plane_of_point(point.xyz)?;
+        let distorted = if self.decentred {
+            self.distort_upright(plane)?.0
+        } else {
+            self.radial.distort(plane)?
+        };
+        self.sensor.pixel(distorted)
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
-        let (plane, by_point) = plane_of_point(point.xyz)?;
-        let (distorted, by_plane) = self.distort(plane)?;
-        let upright = by_plane.determinant() > 0.0;
-        if !upright {
-            return Err(LensError::OutsideField);
-        }
-        let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
+        let plane = plane_of_point(point.xyz)?;
+        let (distorted, by_plane) = self.distort_upright(plane)?;
+        let (pixel, by_distorted) = self.sensor.pixel_with_jacobian(distorted)?;
+        let by_point = plane_by_point(plane, point.xyz.z);
         Ok((
             pixel,
             product(&product(&by_distorted, &by_plane), &by_point),
         ))
     }
 
+    /// As [`Self::distort`] where the map keeps its orientation.
+    #[inline]
+    fn distort_upright(
+        &self,
+        place: Vector2<f64>,
+    ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
+        let (distorted, jacobian) = self.distort(place)?;
+        if determinant(&jacobian) > 0.0 {
+            Ok((distorted, jacobian))
+        } else {
+            Err(LensError::OutsideField)
+        }
+    }
+
     /// The distorted place of a place on the plane at unit depth, and its derivative.
     #[inline]
     fn distort(&self, place: Vector2<f64>) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
-        let (mut distorted, mut jacobian) = self.radial.distort(place)?;
+        let (distorted, jacobian) = self.radial.distort_with_jacobian(place)?;
         if self.decentred {
-            let [p1, p2] = self.tangential;
-            let [s1, s2, s3, s4] = self.prism;
-            let (x, y) = (place.x, place.y);
-            let s = place.norm_squared();
-            distorted.x += 2.0 * p1 * x * y + p2 * (s + 2.0 * x * x) + s * (s1 + s2 * s);
-            distorted.y += p1 * (s + 2.0 * y * y) + 2.0 * p2 * x * y + s * (s3 + s4 * s);
-            let (prism_x, prism_y) = (2.0 * (s1 + 2.0 * s2 * s), 2.0 * (s3 + 2.0 * s4 * s));
-            jacobian += Matrix2::new(
-                2.0 * p1 * y + 6.0 * p2 * x + prism_x * x,
-                2.0 * p1 * x + 2.0 * p2 * y + prism_x * y,
-                2.0 * p1 * x + 2.0 * p2 * y + prism_y * x,
-                6.0 * p1 * y + 2.0 * p2 * x + prism_y * y,
-            );
+            let (shift, bend) = self.decentring(place);
+            Ok((distorted + shift, jacobian + bend))
+        } else {
+            Ok((distorted, jacobian))
         }
-        Ok((distorted, jacobian))
+    }
+
+    /// The tangential and prism terms at a place, and their derivative.
+    #[inline]
+    fn decentring(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let [p1, p2] = self.tangential;
+        let (x, y) = (place.x, place.y);
+        let s = place.norm_squared();
+        // With m = 2 (p1 y + p2 x) the tangential terms are x m + p2 s and y m + p1 s.
+        let (half, mixed) = (p1 * y + p2 * x, 2.0 * (p1 * x + p2 * y));
+        let mut shift = Vector2::new(2.0 * x * half + p2 * s, 2.0 * y * half + p1 * s);
+        let mut bend = Matrix2::new(
+            2.0 * half + 4.0 * p2 * x,
+            mixed,
+            mixed,
+            2.0 * half + 4.0 * p1 * y,
+        );
+        if self.has_prism {
+            let [s1, s2, s3, s4] = self.prism;
+            shift += Vector2::new(s * (s1 + s2 * s), s * (s3 + s4 * s));
+            let prism = Vector2::new(2.0 * (s1 + 2.0 * s2 * s), 2.0 * (s3 + 2.0 * s4 * s));
+            bend += Matrix2::new(prism.x * x, prism.x * y, prism.y * x, prism.y * y);
+        }
+        (shift, bend)
+    }
+
+    /// The place whose distorted place is given, and its derivative.
+    #[inline]
+    fn undistort(
+        &self,
+        distorted: Vector2<f64>,
+    ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
+        let place = self
+            .undistort_nearby(&Places::<1>::from_fn(|_| distorted))
+            .get(0);
+        if place.x.is_nan() {
+            return self.undistort_anywhere(distorted);
+        }
+        Ok((place, upright_inverse(&self.distort(place)?.1)?))
+    }
+
+    /// The places whose distorted places are given: where the radial part alone would put them, the
+    /// decentring there taken off, twice, and Newton's method from there. Each of the former brings
+    /// the answer nearer by about the share of the decentring in the picture, a thousand times or
+    /// so; then a step with its own derivative and one more with the same. Not numbers where that
+    /// does not suffice.
+    #[inline(always)]
+    fn undistort_nearby<const N: usize>(&self, distorted: &Places<N>) -> Places<N> {
+        let mut near = self.radial.undistort_roughly(distorted);
+        for _ in 0..2 {
+            let radial = Places::from_fn(|i| distorted.get(i) - self.decentring(near.get(i)).0);
+            near = self.radial.undistort_roughly(&radial);
+        }
+        let mut settled = [false; N];
+        near = Places::from_fn(|i| {
+            let (place, is_settled) = self.polished(near.get(i), distorted.get(i));
+            settled[i] = is_settled;
+            place
+        });
+        // Strong decentring takes another two steps.
+        for (i, _) in settled.iter().enumerate().filter(|(_, s)| !**s) {
+            let (place, is_settled) = self.polished(near.get(i), distorted.get(i));
+            let nowhere = Vector2::repeat(f64::NAN);
+            near.set(i, if is_settled { place } else { nowhere });
+        }
+        near
+    }
+
+    /// Two steps of Newton's method with one derivative, and whether these suffice.
+    #[inline(always)]
+    fn polished(&self, near: Vector2<f64>, distorted: Vector2<f64>) -> (Vector2<f64>, bool) {
+        let (seen, jacobian) = self.distort_unbounded(near);
+        let determinant = determinant(&jacobian);
+        let inverse = adjugate(&jacobian) * (1.0 / determinant);
+        let first = product(&inverse, &(distorted - seen));
+        let place = near + first;
+        let second = product(&inverse, &(distorted - self.distort_unbounded(place).0));
+        // What is left is of the order of the product of the two; a hundred covers the curvature.
+        let left = 1e4 * first.norm_squared() * second.norm_squared() * norm_squared(&inverse);
+        let small = left <= f64::EPSILON * f64::EPSILON;
+        let place = place + second;
+        let upright = determinant > 0.0;
+        (place, small & upright & self.radial.is_inside(place))
+    }
+
+    /// As [`Self::distort`], in the field or not.
+    #[inline(always)]
+    fn distort_unbounded(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let (distorted, jacobian) = self.radial.distort_unbounded(place);
+        let (shift, bend) = self.decentring(place);
+        (distorted + shift, jacobian + bend)
     }
 
     /// The place whose distorted place is given, and its derivative: damped Newton steps from where
     /// the radial part alone would put it, never leaving the field.
-    fn undistort(
+    #[cold]
+    #[inline(never)]
+    fn undistort_anywhere(
         &self,
         distorted: Vector2<f64>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
@@ -153,13 +266,13 @@ impl BrownConrady {
         let mut miss = distorted - seen;
         let enough = 4.0 * f64::EPSILON * (1.0 + distorted.norm());
         // The error of a step is of the order of its square; a hundred covers the curvature.
-        let last = |step: Vector2<f64>, inverse: &Matrix2<f64>| {
-            100.0 * step.norm_squared() * inverse.norm() <= f64::EPSILON
+        let is_last = |step: Vector2<f64>, inverse: &Matrix2<f64>| {
+            1e4 * step.norm_squared().powi(2) * norm_squared(inverse) <= f64::EPSILON * f64::EPSILON
         };
         for _ in 0..60 {
             let inverse = upright_inverse(&jacobian)?;
             let step = product(&inverse, &miss);
-            if miss.norm() <= enough || last(step, &inverse) {
+            if miss.norm() <= enough || is_last(step, &inverse) {
                 return Ok((place + step, inverse));
             }
             let mut share = 1.0;
@@ -213,10 +326,52 @@ impl BrownConrady {
     }
 }
 
+impl Central for BrownConrady {
+    #[inline(always)]
+    fn directions<const N: usize>(&self, pixels: &[Pixel; N]) -> [Vector3<f64>; N] {
+        let distorted = self.sensor.planes(pixels);
+        let places = if self.decentred {
+            self.undistort_nearby(&distorted)
+        } else {
+            self.radial.undistort_nearby(&distorted)
+        };
+        places.directions()
+    }
+
+    #[cold]
+    fn searched_direction(&self, pixel: Pixel) -> Result<Vector3<f64>, LensError> {
+        let distorted = self.sensor.plane(pixel)?;
+        let place = if self.decentred {
+            self.undistort_anywhere(distorted)?.0
+        } else {
+            self.radial.undistort(distorted)?
+        };
+        Ok(direction_of_plane(place))
+    }
+}
+
+#[inline(always)]
+fn determinant(m: &Matrix2<f64>) -> f64 {
+    m.m11 * m.m22 - m.m12 * m.m21
+}
+
+#[inline(always)]
+fn norm_squared(m: &Matrix2<f64>) -> f64 {
+    m.m11 * m.m11 + m.m12 * m.m12 + m.m21 * m.m21 + m.m22 * m.m22
+}
+
+/// The inverse times the determinant.
+#[inline(always)]
+fn adjugate(m: &Matrix2<f64>) -> Matrix2<f64> {
+    Matrix2::new(m.m22, -m.m12, -m.m21, m.m11)
+}
+
 /// The inverse of a derivative that keeps its orientation.
+#[inline]
 fn upright_inverse(jacobian: &Matrix2<f64>) -> Result<Matrix2<f64>, LensError> {
-    if jacobian.determinant() > 0.0 {
-        jacobian.try_inverse().ok_or(LensError::OutsideField)
+    let determinant = determinant(jacobian);
+    if determinant > 0.0 {
+        Ok(adjugate(jacobian) * (1.0 / determinant))
     } else {
         Err(LensError::OutsideField)
     }

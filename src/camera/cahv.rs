@@ -138,19 +138,29 @@ impl Cahv {
     }
 
     #[inline]
-    pub(super) fn ray(
-        &self,
-        pixel: Pixel,
-    ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
+    pub(super) fn ray(&self, pixel: Pixel) -> Result<Ray<frame::Camera>, LensError> {
         self.sensor.perspective_ray(pixel)
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn ray_with_jacobian(
+        &self,
+        pixel: Pixel,
+    ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
+        self.sensor.perspective_ray_with_jacobian(pixel)
+    }
+
+    #[inline]
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        self.sensor.perspective_pixel(point)
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
-        self.sensor.perspective_pixel(point)
+        self.sensor.perspective_pixel_with_jacobian(point)
     }
 }
 

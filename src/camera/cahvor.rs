@@ -1,9 +1,12 @@
 //! JPL's camera model with radial distortion.
 
-use nalgebra::{Matrix2x3, Matrix3x2};
+use nalgebra::{Matrix2x3, Matrix3x2, Vector3};
 
 use super::cahv::OpticalAxis;
-use super::perspective::{direction_of_plane, plane_of_point, product};
+use super::lanes::Central;
+use super::perspective::{
+    direction_by_plane, direction_of_plane, plane_by_point, plane_of_point, product,
+};
 use super::radial::Radial;
 use super::sensor::Sensor;
 use super::{BadLens, Cahv, CahvVectors, LensError, Mount, central_ray};
@@ -63,37 +66,59 @@ impl Cahvor {
     }
 
     #[inline]
-    pub(super) fn ray(
+    pub(super) fn ray_with_jacobian(
         &self,
         pixel: Pixel,
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
-        let (distorted, distorted_by_pixel) = self.sensor.plane(pixel)?;
-        let (plane, by_distorted) = self.radial.undistort(distorted)?;
-        let (direction, by_plane) = direction_of_plane(plane);
+        let (distorted, distorted_by_pixel) = self.sensor.plane_with_jacobian(pixel)?;
+        let (plane, by_distorted) = self.radial.undistort_with_jacobian(distorted)?;
+        let direction = direction_of_plane(plane);
         let turn = self.optical.lens_from_camera.transpose();
         let jacobian = product(
-            &product(&turn, &by_plane),
+            &product(&turn, &direction_by_plane(direction)),
             &product(&by_distorted, &distorted_by_pixel),
         );
         Ok((central_ray(product(&turn, &direction)), jacobian))
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        let plane = plane_of_point(product(&self.optical.lens_from_camera, &point.xyz))?;
+        self.sensor.pixel(self.radial.distort(plane)?)
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
         let turn = self.optical.lens_from_camera;
-        let (plane, by_point) = plane_of_point(product(&turn, &point.xyz))?;
-        let (distorted, by_plane) = self.radial.distort(plane)?;
-        let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
+        let in_lens = product(&turn, &point.xyz);
+        let plane = plane_of_point(in_lens)?;
+        let (distorted, by_plane) = self.radial.distort_with_jacobian(plane)?;
+        let (pixel, by_distorted) = self.sensor.pixel_with_jacobian(distorted)?;
         Ok((
             pixel,
             product(
                 &product(&by_distorted, &by_plane),
-                &product(&by_point, &turn),
+                &product(&plane_by_point(plane, in_lens.z), &turn),
             ),
         ))
+    }
+}
+
+impl Central for Cahvor {
+    #[inline(always)]
+    fn directions<const N: usize>(&self, pixels: &[Pixel; N]) -> [Vector3<f64>; N] {
+        let planes = self.radial.undistort_nearby(&self.sensor.planes(pixels));
+        let turn = self.optical.lens_from_camera.transpose();
+        planes.directions().map(|unit| product(&turn, &unit))
+    }
+
+    fn searched_direction(&self, pixel: Pixel) -> Result<Vector3<f64>, LensError> {
+        let plane = self.radial.undistort(self.sensor.plane(pixel)?)?;
+        let turn = self.optical.lens_from_camera.transpose();
+        Ok(product(&turn, &direction_of_plane(plane)))
     }
 }
 

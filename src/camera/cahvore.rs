@@ -2,14 +2,14 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, RowVector2, Vector2, Vector3};
 
-use super::angle::{angle_jacobian, direction_of_angle};
+use super::angle::{angle_jacobian, direction_of_angle, direction_of_angle_with_jacobian};
 use super::cahv::OpticalAxis;
 use super::perspective::{product, radial_jacobian};
 use super::radial::{Radial, increasing_root};
 use super::sensor::Sensor;
-use super::{BadLens, Cahv, CahvVectors, LensError, Mount};
+use super::{BadLens, Cahv, CahvVectors, LensError, Mount, RayJacobian};
 use crate::frame::{self, Direction, Pixel, Point, Ray};
 
 /// How a CAHVORE lens images the angle theta from its axis, before its polynomial: `mtype` and
@@ -95,7 +95,7 @@ impl Cahvore {
         };
         let quarter = FRAC_PI_2 / linearity.value().abs();
         let turning = lens
-            .angle(radial.limit())
+            .angle(lens.radial.limit())
             .map_or(quarter, |(theta, _)| theta);
         lens.field_angle = WIDEST_ANGLE.min(quarter).min(turning);
         Ok(lens)
@@ -132,12 +132,53 @@ impl Cahvore {
     }
 
     #[inline]
-    pub(super) fn ray(
+    pub(super) fn ray(&self, pixel: Pixel) -> Result<Ray<frame::Camera>, LensError> {
+        let chi = self.radial.undistort(self.sensor.plane(pixel)?)?;
+        let (angle, theta, _) = self.angle_of_chi(chi)?;
+        Ok(self.ray_of_angle(theta, direction_of_angle(angle)))
+    }
+
+    #[inline]
+    pub(super) fn ray_with_jacobian(
         &self,
         pixel: Pixel,
-    ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
-        let (distorted, distorted_by_pixel) = self.sensor.plane(pixel)?;
-        let (chi, by_distorted) = self.radial.undistort(distorted)?;
+    ) -> Result<(Ray<frame::Camera>, RayJacobian), LensError> {
+        let (distorted, distorted_by_pixel) = self.sensor.plane_with_jacobian(pixel)?;
+        let (chi, by_distorted) = self.radial.undistort_with_jacobian(distorted)?;
+        let (angle, theta, by_chi) = self.angle_of_chi(chi)?;
+        let (direction, by_angle) = direction_of_angle_with_jacobian(angle);
+        let turn = self.optical.lens_from_camera.transpose();
+        let angle_by_pixel = product(&by_chi, &product(&by_distorted, &distorted_by_pixel));
+        // On the axis, where the angle has no direction, the pupil stands still.
+        let theta_by_pixel = if theta > 0.0 {
+            product(&(angle / theta).transpose(), &angle_by_pixel)
+        } else {
+            RowVector2::zeros()
+        };
+        let along = turn.column(2) * self.pupil_slope(theta);
+        let jacobian = RayJacobian {
+            origin: product(&along, &theta_by_pixel),
+            direction: product(&turn, &product(&by_angle, &angle_by_pixel)),
+        };
+        Ok((self.ray_of_angle(theta, direction), jacobian))
+    }
+
+    /// The ray at an angle from the optical axis, in a direction of lens axes.
+    #[inline]
+    fn ray_of_angle(&self, theta: f64, direction: Vector3<f64>) -> Ray<frame::Camera> {
+        let turn = self.optical.lens_from_camera.transpose();
+        Ray {
+            origin: Point::from_xyz(turn.column(2) * self.pupil_shift(theta)),
+            direction: Direction::from_unit(product(&turn, &direction)),
+        }
+    }
+
+    /// The angle vector of a place on the undistorted plane, its length, and its derivative.
+    #[inline]
+    fn angle_of_chi(
+        &self,
+        chi: Vector2<f64>,
+    ) -> Result<(Vector2<f64>, f64, Matrix2<f64>), LensError> {
         let radius = chi.norm();
         let (theta, slope) = self.angle(radius).ok_or(LensError::OutsideField)?;
         if theta >= self.field_angle {
@@ -148,22 +189,24 @@ impl Cahvore {
         } else {
             (Vector2::x(), 1.0)
         };
-        let by_chi = radial_jacobian(unit, slope, ratio);
-        let (direction, by_angle) = direction_of_angle(unit * theta);
-        let turn = self.optical.lens_from_camera.transpose();
-        let ray = Ray {
-            origin: Point::from_xyz(turn.column(2) * self.pupil_shift(theta)),
-            direction: Direction::from_unit(product(&turn, &direction)),
-        };
-        let jacobian = product(
-            &product(&by_angle, &by_chi),
-            &product(&by_distorted, &distorted_by_pixel),
-        );
-        Ok((ray, product(&turn, &jacobian)))
+        Ok((unit * theta, theta, radial_jacobian(unit, slope, ratio)))
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        let in_lens = product(&self.optical.lens_from_camera, &point.xyz);
+        let (angle, _) = self.angle_vector(in_lens)?;
+        let theta = angle.norm();
+        let ratio = if theta > 0.0 {
+            self.image(theta).0 / theta
+        } else {
+            1.0
+        };
+        self.sensor.pixel(self.radial.distort(angle * ratio)?)
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
@@ -177,8 +220,8 @@ impl Cahvore {
             (Vector2::x(), 1.0)
         };
         let by_angle = radial_jacobian(unit, slope, ratio);
-        let (distorted, by_chi) = self.radial.distort(unit * chi)?;
-        let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
+        let (distorted, by_chi) = self.radial.distort_with_jacobian(angle * ratio)?;
+        let (pixel, by_distorted) = self.sensor.pixel_with_jacobian(distorted)?;
         let jacobian = product(
             &product(&by_distorted, &product(&by_chi, &by_angle)),
             &product(&by_point, &turn),
@@ -217,22 +260,32 @@ impl Cahvore {
             return Ok(0.0);
         }
         let equation = |theta: f64| self.pupil_equation(theta, lambda, zeta);
-        if equation(self.field_angle).0 <= 0.0 {
+        let start = lambda.atan2(zeta);
+        let Some(high) = self.beyond_root(equation, start) else {
             let behind = zeta <= 0.0 && self.field_angle <= FRAC_PI_2;
             return Err(if behind {
                 LensError::BehindCamera
             } else {
                 LensError::OutsideField
             });
+        };
+        increasing_root(equation, high, start, 2.0 * f64::EPSILON * distance)
+            .ok_or(LensError::NoConvergence)
+    }
+
+    /// An angle at which the equation is above zero: the field's end, or, where a pupil that moves
+    /// far has already turned a near point's equation back there, one on the way to it.
+    fn beyond_root(&self, equation: impl Fn(f64) -> (f64, f64), start: f64) -> Option<f64> {
+        let end = self.field_angle;
+        let above = |theta: &f64| equation(*theta).0 > 0.0;
+        if above(&end) {
+            return Some(end);
         }
-        let start = lambda.atan2(zeta);
-        increasing_root(
-            equation,
-            self.field_angle,
-            start,
-            2.0 * f64::EPSILON * distance,
-        )
-        .ok_or(LensError::NoConvergence)
+        const STEPS: u32 = 32;
+        (0..STEPS)
+            .map(|i| start + (end - start) * f64::from(i) / f64::from(STEPS))
+            .take_while(|_| start < end)
+            .find(above)
     }
 
     /// `zeta sin theta - lambda cos theta - (theta - sin theta) E(theta)`, which is zero at the angle
@@ -263,6 +316,24 @@ impl Cahvore {
             theta / theta.sin() - 1.0
         };
         stretch * (e0 + squared * (e1 + squared * e2))
+    }
+
+    /// The derivative of [`Self::pupil_shift`] by the angle, metres per radian.
+    fn pupil_slope(&self, theta: f64) -> f64 {
+        let [e0, e1, e2] = self.pupil;
+        let squared = theta * theta;
+        let (sin, cos) = theta.sin_cos();
+        // As of the shift, with more terms: the difference below loses three powers of theta.
+        let (stretch, stretch_slope) = if theta < 1e-2 {
+            (
+                squared * (1.0 / 6.0 + squared * (7.0 / 360.0)),
+                theta * (1.0 / 3.0 + squared * (7.0 / 90.0 + squared * (31.0 / 2520.0))),
+            )
+        } else {
+            (theta / sin - 1.0, (sin - theta * cos) / (sin * sin))
+        };
+        stretch_slope * (e0 + squared * (e1 + squared * e2))
+            + stretch * 2.0 * theta * (e1 + 2.0 * e2 * squared)
     }
 
     /// chi of theta, and its derivative.

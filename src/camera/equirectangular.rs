@@ -29,8 +29,14 @@ impl Equirectangular {
         }
     }
 
+    // Discarded derivatives are a handful of products beside four trigonometric functions.
     #[inline]
-    pub(super) fn ray(
+    pub(super) fn ray(&self, pixel: Pixel) -> Result<Ray<frame::Camera>, LensError> {
+        Ok(self.ray_with_jacobian(pixel)?.0)
+    }
+
+    #[inline]
+    pub(super) fn ray_with_jacobian(
         &self,
         pixel: Pixel,
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
@@ -57,7 +63,12 @@ impl Equirectangular {
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        Ok(self.pixel_with_jacobian(point)?.0)
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {

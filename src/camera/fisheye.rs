@@ -1,8 +1,14 @@
 //! OpenCV's fisheye model.
 
-use nalgebra::{Matrix2x3, Matrix3x2};
+use std::f64::consts::PI;
 
-use super::angle::{angle_of_point, direction_of_angle};
+use nalgebra::{Matrix2x3, Matrix3x2, Vector3};
+
+use super::angle::{
+    angle_of_point, angle_of_point_with_jacobian, direction_of_angle,
+    direction_of_angle_with_jacobian,
+};
+use super::lanes::Central;
 use super::perspective::product;
 use super::radial::Radial;
 use super::sensor::Sensor;
@@ -16,7 +22,7 @@ use crate::frame::{self, Pixel, Point, Ray};
 ///
 /// `theta` is taken from 0 to 180 degrees; points beside and behind the plane of the camera are in
 /// the field where the polynomial still grows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Fisheye {
     intrinsics: Intrinsics,
     distortion: [f64; 4],
@@ -32,9 +38,8 @@ impl Fisheye {
     pub fn new(intrinsics: Intrinsics, distortion: [f64; 4]) -> Result<Self, BadLens> {
         intrinsics.check()?;
         let [k1, k2, k3, k4] = distortion;
-        let radial = Radial::new([1.0, k1, k2, k3, k4], [1.0, 0.0, 0.0, 0.0])
-            .ok_or(BadLens::Distortion)?
-            .limited(std::f64::consts::PI);
+        let radial = Radial::up_to(PI, [1.0, k1, k2, k3, k4], [1.0, 0.0, 0.0, 0.0])
+            .ok_or(BadLens::Distortion)?;
         Ok(Self {
             intrinsics,
             distortion,
@@ -59,28 +64,47 @@ impl Fisheye {
     }
 
     #[inline]
-    pub(super) fn ray(
+    pub(super) fn ray_with_jacobian(
         &self,
         pixel: Pixel,
     ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
-        let (distorted, distorted_by_pixel) = self.sensor.plane(pixel)?;
-        let (angle, by_distorted) = self.radial.undistort(distorted)?;
-        let (direction, by_angle) = direction_of_angle(angle);
+        let (distorted, distorted_by_pixel) = self.sensor.plane_with_jacobian(pixel)?;
+        let (angle, by_distorted) = self.radial.undistort_with_jacobian(distorted)?;
+        let (direction, by_angle) = direction_of_angle_with_jacobian(angle);
         let jacobian = product(&by_angle, &product(&by_distorted, &distorted_by_pixel));
         Ok((central_ray(direction), jacobian))
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        let angle = angle_of_point(point.xyz)?;
+        self.sensor.pixel(self.radial.distort(angle)?)
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
-        let (angle, by_point) = angle_of_point(point.xyz)?;
-        let (distorted, by_angle) = self.radial.distort(angle)?;
-        let (pixel, by_distorted) = self.sensor.pixel(distorted)?;
+        let (angle, by_point) = angle_of_point_with_jacobian(point.xyz)?;
+        let (distorted, by_angle) = self.radial.distort_with_jacobian(angle)?;
+        let (pixel, by_distorted) = self.sensor.pixel_with_jacobian(distorted)?;
         Ok((
             pixel,
             product(&product(&by_distorted, &by_angle), &by_point),
         ))
+    }
+}
+
+impl Central for Fisheye {
+    #[inline(always)]
+    fn directions<const N: usize>(&self, pixels: &[Pixel; N]) -> [Vector3<f64>; N] {
+        let angles = self.radial.undistort_nearby(&self.sensor.planes(pixels));
+        std::array::from_fn(|i| direction_of_angle(angles.get(i)))
+    }
+
+    fn searched_direction(&self, pixel: Pixel) -> Result<Vector3<f64>, LensError> {
+        let angle = self.radial.undistort(self.sensor.plane(pixel)?)?;
+        Ok(direction_of_angle(angle))
     }
 }

@@ -1,7 +1,8 @@
 //! The lens models under one roof.
 
-use nalgebra::{Matrix2x3, Matrix3x2, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Vector2, Vector3};
 
+use super::lanes::Central;
 use super::{BrownConrady, Cahv, Cahvor, Cahvore, Equirectangular, Fisheye, Pinhole};
 use crate::frame::{self, Direction, Pixel, Point, Ray};
 
@@ -73,6 +74,21 @@ pub enum Lens {
     Cahvore(Cahvore),
 }
 
+/// The same for whichever model a lens is.
+macro_rules! by_model {
+    ($lens:expr, $model:ident => $done:expr) => {
+        match $lens {
+            Lens::Pinhole($model) => $done,
+            Lens::BrownConrady($model) => $done,
+            Lens::Fisheye($model) => $done,
+            Lens::Equirectangular($model) => $done,
+            Lens::Cahv($model) => $done,
+            Lens::Cahvor($model) => $done,
+            Lens::Cahvore($model) => $done,
+        }
+    };
+}
+
 impl Lens {
     /// The word `model = "..."` of cameras.toml.
     pub fn model(&self) -> &'static str {
@@ -87,35 +103,110 @@ impl Lens {
         }
     }
 
+    /// The ray of a pixel.
     #[inline]
-    pub(super) fn ray(
+    pub(super) fn ray(&self, pixel: Pixel) -> Result<Ray<frame::Camera>, LensError> {
+        by_model!(self, lens => lens.ray(pixel))
+    }
+
+    /// The rays of pixels, in order, as many as fit; `on_sensor` takes a pixel to the sensor.
+    pub(super) fn rays(
         &self,
-        pixel: Pixel,
-    ) -> Result<(Ray<frame::Camera>, Matrix3x2<f64>), LensError> {
+        pixels: &[Pixel],
+        on_sensor: impl Fn(Pixel) -> Pixel,
+        rays: &mut [Result<Ray<frame::Camera>, LensError>],
+    ) {
+        macro_rules! one_by_one {
+            ($lens:expr) => {
+                for (ray, &pixel) in rays.iter_mut().zip(pixels) {
+                    *ray = $lens.ray(on_sensor(pixel));
+                }
+            };
+        }
         match self {
-            Self::Pinhole(lens) => lens.ray(pixel),
-            Self::BrownConrady(lens) => lens.ray(pixel),
-            Self::Fisheye(lens) => lens.ray(pixel),
-            Self::Equirectangular(lens) => lens.ray(pixel),
-            Self::Cahv(lens) => lens.ray(pixel),
-            Self::Cahvor(lens) => lens.ray(pixel),
-            Self::Cahvore(lens) => lens.ray(pixel),
+            Self::BrownConrady(lens) => lens.rays(pixels, on_sensor, rays),
+            Self::Fisheye(lens) => lens.rays(pixels, on_sensor, rays),
+            Self::Cahvor(lens) => lens.rays(pixels, on_sensor, rays),
+            Self::Pinhole(lens) => one_by_one!(lens),
+            Self::Equirectangular(lens) => one_by_one!(lens),
+            Self::Cahv(lens) => one_by_one!(lens),
+            Self::Cahvore(lens) => one_by_one!(lens),
         }
     }
 
     #[inline]
-    pub(super) fn pixel(
+    pub(super) fn ray_with_jacobian(
+        &self,
+        pixel: Pixel,
+    ) -> Result<(Ray<frame::Camera>, RayJacobian), LensError> {
+        // The moved pupil of a CAHVORE lens is the one origin that depends on the pixel.
+        let central = |(ray, direction)| {
+            let origin = Matrix3x2::zeros();
+            (ray, RayJacobian { origin, direction })
+        };
+        match self {
+            Self::Pinhole(lens) => lens.ray_with_jacobian(pixel).map(central),
+            Self::BrownConrady(lens) => lens.ray_with_jacobian(pixel).map(central),
+            Self::Fisheye(lens) => lens.ray_with_jacobian(pixel).map(central),
+            Self::Equirectangular(lens) => lens.ray_with_jacobian(pixel).map(central),
+            Self::Cahv(lens) => lens.ray_with_jacobian(pixel).map(central),
+            Self::Cahvor(lens) => lens.ray_with_jacobian(pixel).map(central),
+            Self::Cahvore(lens) => lens.ray_with_jacobian(pixel),
+        }
+    }
+
+    /// The pixel of a point.
+    #[inline]
+    pub(super) fn pixel(&self, point: Point<frame::Camera>) -> Result<Pixel, LensError> {
+        by_model!(self, lens => lens.pixel(point))
+    }
+
+    /// The pixels of points, in order, as many as fit.
+    pub(super) fn pixels(
+        &self,
+        points: &[Point<frame::Camera>],
+        pixels: &mut [Result<Pixel, LensError>],
+    ) {
+        by_model!(self, lens => {
+            for (pixel, &point) in pixels.iter_mut().zip(points) {
+                *pixel = lens.pixel(point);
+            }
+        });
+    }
+
+    #[inline]
+    pub(super) fn pixel_with_jacobian(
         &self,
         point: Point<frame::Camera>,
     ) -> Result<(Pixel, Matrix2x3<f64>), LensError> {
-        match self {
-            Self::Pinhole(lens) => lens.pixel(point),
-            Self::BrownConrady(lens) => lens.pixel(point),
-            Self::Fisheye(lens) => lens.pixel(point),
-            Self::Equirectangular(lens) => lens.pixel(point),
-            Self::Cahv(lens) => lens.pixel(point),
-            Self::Cahvor(lens) => lens.pixel(point),
-            Self::Cahvore(lens) => lens.pixel(point),
+        by_model!(self, lens => lens.pixel_with_jacobian(point))
+    }
+}
+
+/// How a ray changes with its pixel: rows are components in the ray's axes, columns u and v.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RayJacobian {
+    /// Of the origin, metres per pixel; zero but for CAHVORE lenses, whose entrance pupil moves.
+    pub origin: Matrix3x2<f64>,
+    /// Of the unit direction, per pixel.
+    pub direction: Matrix3x2<f64>,
+}
+
+impl RayJacobian {
+    /// In axes that the rotation matrix turns the present ones into.
+    #[must_use]
+    pub fn turned(&self, rotation: &Matrix3<f64>) -> Self {
+        Self {
+            origin: rotation * self.origin,
+            direction: rotation * self.direction,
+        }
+    }
+
+    /// By pixels of which the present ones are so many by columns and by rows.
+    pub(super) fn scale_columns(&mut self, step: Vector2<f64>) {
+        for matrix in [&mut self.origin, &mut self.direction] {
+            matrix.column_mut(0).scale_mut(step.x);
+            matrix.column_mut(1).scale_mut(step.y);
         }
     }
 }

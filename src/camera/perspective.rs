@@ -4,46 +4,52 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix, Vector2, Vector3};
 
 use super::LensError;
 
-/// Where the line to `point` meets the plane z = 1, and its derivative by the point.
+/// Where the line to `point` meets the plane z = 1.
 ///
 /// # Errors
 /// [`LensError::BehindCamera`] where z is not above zero.
 #[inline]
-pub(super) fn plane_of_point(
-    point: Vector3<f64>,
-) -> Result<(Vector2<f64>, Matrix2x3<f64>), LensError> {
+pub(super) fn plane_of_point(point: Vector3<f64>) -> Result<Vector2<f64>, LensError> {
     if point.z > 0.0 && point.iter().all(|c| c.is_finite()) {
-        let inverse = 1.0 / point.z;
-        let plane = point.xy() * inverse;
-        let jacobian = Matrix2x3::new(
-            inverse,
-            0.0,
-            -plane.x * inverse,
-            0.0,
-            inverse,
-            -plane.y * inverse,
-        );
-        Ok((plane, jacobian))
+        Ok(point.xy() * (1.0 / point.z))
     } else {
         Err(LensError::BehindCamera)
     }
 }
 
-/// The unit direction to a place on the plane z = 1, and its derivative by that place.
+/// The derivative of [`plane_of_point`] at a point of depth `z` seen at `plane`.
 #[inline]
-pub(super) fn direction_of_plane(plane: Vector2<f64>) -> (Vector3<f64>, Matrix3x2<f64>) {
+pub(super) fn plane_by_point(plane: Vector2<f64>, z: f64) -> Matrix2x3<f64> {
+    let inverse = 1.0 / z;
+    Matrix2x3::new(
+        inverse,
+        0.0,
+        -plane.x * inverse,
+        0.0,
+        inverse,
+        -plane.y * inverse,
+    )
+}
+
+/// The unit direction to a place on the plane z = 1.
+#[inline]
+pub(super) fn direction_of_plane(plane: Vector2<f64>) -> Vector3<f64> {
     let inverse = 1.0 / (1.0 + plane.norm_squared()).sqrt();
-    let unit = Vector3::new(plane.x, plane.y, 1.0) * inverse;
-    let bend = plane * (inverse * inverse);
-    let jacobian = Matrix3x2::new(
-        inverse - unit.x * bend.x,
+    Vector3::new(plane.x * inverse, plane.y * inverse, inverse)
+}
+
+/// The derivative of [`direction_of_plane`] by the place, where it gives `unit`.
+#[inline]
+pub(super) fn direction_by_plane(unit: Vector3<f64>) -> Matrix3x2<f64> {
+    let bend = unit.xy() * unit.z;
+    Matrix3x2::new(
+        unit.z - unit.x * bend.x,
         -unit.x * bend.y,
         -unit.y * bend.x,
-        inverse - unit.y * bend.y,
+        unit.z - unit.y * bend.y,
         -unit.z * bend.x,
         -unit.z * bend.y,
-    );
-    (unit, jacobian)
+    )
 }
 
 /// The derivative of a radial map of the plane at a place in the direction `unit` from its centre:

@@ -3,13 +3,15 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::LensError;
+use super::inverse::InverseTable;
+use super::lanes::Places;
 use super::polynomial::{derivative, difference, evaluate, first_positive_root, product};
 
 /// `r_d = r N(r^2) / D(r^2)`: the radial part of every lens model here.
 ///
 /// It is used up to the smallest radius at which `r_d` stops growing (or the denominator vanishes):
 /// beyond it a point outside the field would fold back into the picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Radial {
     numerator: [f64; 5],
     denominator: [f64; 4],
@@ -19,12 +21,23 @@ pub(super) struct Radial {
     limit: f64,
     /// The distorted radius at the limit.
     distorted_limit: f64,
+    /// Where Newton's method for the inverse starts.
+    inverse: InverseTable,
 }
+
+/// The table of the inverse ends at this undistorted radius at the latest: 86 degrees from the axis
+/// at unit depth.
+const TABLE_RADIUS: f64 = 14.0;
 
 impl Radial {
     /// From the coefficients of N and D in powers of `r^2`; `None` where the distorted radius does
     /// not grow with the radius at the centre, or a coefficient is not finite.
     pub(super) fn new(numerator: [f64; 5], denominator: [f64; 4]) -> Option<Self> {
+        Self::up_to(f64::INFINITY, numerator, denominator)
+    }
+
+    /// As [`Radial::new`], for radii up to `most` only.
+    pub(super) fn up_to(most: f64, numerator: [f64; 5], denominator: [f64; 4]) -> Option<Self> {
         let all = || numerator.iter().chain(&denominator);
         if !all().all(|c| c.is_finite()) || numerator[0] <= 0.0 || denominator[0] <= 0.0 {
             return None;
@@ -51,13 +64,15 @@ impl Radial {
                 polynomial: denominator == [1.0, 0.0, 0.0, 0.0],
                 limit: f64::INFINITY,
                 distorted_limit: f64::INFINITY,
+                inverse: InverseTable::empty(),
             }
-            .limited(limit.sqrt()),
+            .limited(limit.sqrt().min(most))
+            .tabulated(),
         )
     }
 
     /// The same map, used up to `limit` at most.
-    pub(super) fn limited(mut self, limit: f64) -> Self {
+    fn limited(mut self, limit: f64) -> Self {
         if limit < self.limit {
             self.limit = limit;
             let (factor, _) = self.factor(limit * limit);
@@ -68,6 +83,19 @@ impl Radial {
                 f64::INFINITY
             };
         }
+        self
+    }
+
+    /// The same map with the table of its inverse.
+    fn tabulated(mut self) -> Self {
+        // At the limit itself the inverse has no slope.
+        let end = TABLE_RADIUS.min(0.9999 * self.limit);
+        let distorted = end * self.factor(end * end).0;
+        self.inverse = InverseTable::new(distorted * distorted, |q| {
+            let ratio = self.searched_ratio(q).ok()?;
+            let (_, slope) = self.ratio_slope(ratio, q).ok()?;
+            Some((ratio, slope))
+        });
         self
     }
 
@@ -88,54 +116,147 @@ impl Radial {
         (factor, (n_slope - factor * d_slope) / d)
     }
 
-    /// The distorted place of a place, and its derivative.
+    /// The distorted place of a place.
     ///
     /// # Errors
     /// [`LensError::OutsideField`] beyond the radius of use.
     #[inline]
-    pub(super) fn distort(
+    pub(super) fn distort(&self, place: Vector2<f64>) -> Result<Vector2<f64>, LensError> {
+        if self.is_inside(place) {
+            Ok(place * self.factor(place.norm_squared()).0)
+        } else {
+            Err(LensError::OutsideField)
+        }
+    }
+
+    /// As [`Radial::distort`], with the derivative.
+    #[inline]
+    pub(super) fn distort_with_jacobian(
         &self,
         place: Vector2<f64>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
-        let s = place.norm_squared();
-        let inside = s < self.limit * self.limit;
-        if !inside {
-            return Err(LensError::OutsideField);
+        if self.is_inside(place) {
+            Ok(self.distort_unbounded(place))
+        } else {
+            Err(LensError::OutsideField)
         }
-        let (factor, slope) = self.factor(s);
-        let bend = place * (2.0 * slope);
-        let jacobian = Matrix2::new(
-            factor + place.x * bend.x,
-            place.x * bend.y,
-            place.y * bend.x,
-            factor + place.y * bend.y,
-        );
-        Ok((place * factor, jacobian))
     }
 
-    /// The place whose distorted place is given, and its derivative.
+    /// As [`Radial::distort_with_jacobian`], within the radius of use or not.
+    #[inline(always)]
+    pub(super) fn distort_unbounded(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let (factor, slope) = self.factor(place.norm_squared());
+        (place * factor, scaling_jacobian(place, factor, slope))
+    }
+
+    /// Whether a place is within the radius of use.
+    #[inline(always)]
+    pub(super) fn is_inside(&self, place: Vector2<f64>) -> bool {
+        place.norm_squared() < self.limit * self.limit
+    }
+
+    /// The place whose distorted place is given, wherever it is.
     ///
     /// # Errors
     /// [`LensError::OutsideField`] where no place within the radius of use is distorted to it.
     #[inline]
-    pub(super) fn undistort(
+    pub(super) fn undistort(&self, distorted: Vector2<f64>) -> Result<Vector2<f64>, LensError> {
+        Ok(distorted * self.ratio(distorted.norm_squared())?)
+    }
+
+    /// As [`Radial::undistort`], with the derivative.
+    #[inline]
+    pub(super) fn undistort_with_jacobian(
         &self,
         distorted: Vector2<f64>,
     ) -> Result<(Vector2<f64>, Matrix2<f64>), LensError> {
-        let distorted_radius = distorted.norm();
-        let radius = self.radius(distorted_radius, 4.0 * f64::EPSILON)?;
-        let (factor, slope) = self.factor(radius * radius);
-        let growth = factor + 2.0 * radius * radius * slope;
-        if growth <= 0.0 {
-            return Err(LensError::OutsideField);
-        }
-        let unit = if distorted_radius > 0.0 {
-            distorted / distorted_radius
+        let q = distorted.norm_squared();
+        let (ratio, slope) = self.ratio_slope(self.ratio(q)?, q)?;
+        let jacobian = scaling_jacobian(distorted, ratio, slope);
+        Ok((distorted * ratio, jacobian))
+    }
+
+    /// The same but for a billionth or so.
+    #[inline(always)]
+    pub(super) fn undistort_roughly<const N: usize>(&self, distorted: &Places<N>) -> Places<N> {
+        let q: [f64; N] = std::array::from_fn(|i| distorted.get(i).norm_squared());
+        let ratios = q.map(|q| self.inverse.ratio(q));
+        Places::from_fn(|i| distorted.get(i) * ratios[i])
+    }
+
+    /// The places whose distorted places are given, by the short way.
+    #[inline(always)]
+    pub(super) fn undistort_nearby<const N: usize>(&self, distorted: &Places<N>) -> Places<N> {
+        let q: [f64; N] = std::array::from_fn(|i| distorted.get(i).norm_squared());
+        let ratios = self.nearby_ratios(&q);
+        Places::from_fn(|i| distorted.get(i) * ratios[i])
+    }
+
+    /// The undistorted radius over the distorted one, whose square is `q`.
+    #[inline]
+    fn ratio(&self, q: f64) -> Result<f64, LensError> {
+        let [ratio] = self.nearby_ratios(&[q]);
+        if ratio.is_nan() {
+            self.searched_ratio(q)
         } else {
-            Vector2::x()
-        };
-        let jacobian = super::perspective::radial_jacobian(unit, 1.0 / growth, 1.0 / factor);
-        Ok((unit * radius, jacobian))
+            Ok(ratio)
+        }
+    }
+
+    /// The roots of `g factor(g^2 q) - 1` next to the table's, by one step of Newton's method, or by
+    /// two; not numbers where these do not suffice, or lead out of the radius of use.
+    #[inline(always)]
+    fn nearby_ratios<const N: usize>(&self, q: &[f64; N]) -> [f64; N] {
+        let mut ratios = q.map(|q| self.inverse.ratio(q));
+        let mut settled = [false; N];
+        for i in 0..N {
+            (ratios[i], settled[i]) = self.polished_ratio(ratios[i], q[i]);
+        }
+        for (i, _) in settled.iter().enumerate().filter(|(_, s)| !**s) {
+            let (ratio, is_settled) = self.polished_ratio(ratios[i], q[i]);
+            ratios[i] = if is_settled { ratio } else { f64::NAN };
+        }
+        ratios
+    }
+
+    /// One step of Newton's method, and whether it was the last that is needed.
+    #[inline(always)]
+    fn polished_ratio(&self, near: f64, q: f64) -> (f64, bool) {
+        let s = near * near * q;
+        let (factor, slope) = self.factor(s);
+        let growth = factor + 2.0 * s * slope;
+        let step = (1.0 - near * factor) / growth;
+        let ratio = near + step;
+        // One at the centre, zero at the limit, where the map has no inverse.
+        let slack = growth * ratio;
+        // The error of a step is of the order of its square; a hundred covers the curvature.
+        let small = 100.0 * step * step <= f64::EPSILON * slack * ratio * ratio;
+        let inside = ratio * ratio * q < self.limit * self.limit;
+        (ratio, small & inside & (slack > 1e-6))
+    }
+
+    /// The same wherever it is, by a search that cannot fail.
+    #[cold]
+    #[inline(never)]
+    fn searched_ratio(&self, q: f64) -> Result<f64, LensError> {
+        if q == 0.0 {
+            return Ok(1.0 / self.factor(0.0).0);
+        }
+        let distorted = q.sqrt();
+        Ok(self.radius(distorted, 4.0 * f64::EPSILON)? / distorted)
+    }
+
+    /// The ratio, with its derivative by `q`: `g factor(g^2 q) = 1` differentiated.
+    #[inline]
+    fn ratio_slope(&self, ratio: f64, q: f64) -> Result<(f64, f64), LensError> {
+        let s = ratio * ratio * q;
+        let (factor, slope) = self.factor(s);
+        let growth = factor + 2.0 * s * slope;
+        if growth > 0.0 {
+            Ok((ratio, -ratio * ratio * ratio * slope / growth))
+        } else {
+            Err(LensError::OutsideField)
+        }
     }
 
     /// The radius that is distorted to `distorted`, but for a share `tolerance` of that.
@@ -178,6 +299,19 @@ impl Radial {
         }
         None
     }
+}
+
+/// The derivative of `place * factor(|place|^2)` by the place.
+#[inline(always)]
+fn scaling_jacobian(place: Vector2<f64>, factor: f64, slope: f64) -> Matrix2<f64> {
+    let bend = place * (2.0 * slope);
+    let mixed = place.x * bend.y;
+    Matrix2::new(
+        factor + place.x * bend.x,
+        mixed,
+        mixed,
+        factor + place.y * bend.y,
+    )
 }
 
 /// The root in [0, `high`] of an increasing function that gives its value and slope, by Newton's

@@ -1,10 +1,9 @@
 //! Reads cameras.toml.
 
-use std::path::Path;
-
+use super::read_readout::readout;
 use super::{
     BadLens, BodyAxes, BrownConrady, Cahv, CahvVectors, Cahvor, Cahvore, Camera, Cameras,
-    Equirectangular, Fisheye, Intrinsics, Lens, Linearity, Mount, Pinhole, read_camera_file,
+    Equirectangular, Fisheye, Intrinsics, Lens, Linearity, Mount, Pinhole,
 };
 use crate::error::Error;
 use crate::frame::{Point, Vector};
@@ -21,15 +20,6 @@ const MODELS: [&str; 7] = [
 ];
 
 const THREE: &str = "a list of 3 finite numbers";
-
-/// The cameras of a cameras.toml, or of a file in one of the other formats that
-/// [`super::read_camera_file`] knows. `shown` is the name faults call the file by.
-///
-/// # Errors
-/// A file that cannot be read, and every fault in it at once, with line and column.
-pub fn read_cameras(path: &Path, shown: &str) -> Result<Cameras, Error> {
-    Ok(read_camera_file(path, shown)?.cameras)
-}
 
 /// The cameras of a cameras.toml's text: `[cameras.NAME]` with a lens, and `[cameras.NAME.mount]`,
 /// without which the camera looks forward from the body's origin.
@@ -80,19 +70,23 @@ pub(crate) fn camera(name: String, section: Section) -> Option<Camera> {
         lens.zip(read_mount(&mount))
     };
     mount.finish();
+    let readout = readout(&section, width, height);
     section.finish();
     let (lens, mount) = camera?;
+    let readout = readout?;
+    let [width, height] = readout.size();
     Some(Camera {
         name,
-        width: width?,
-        height: height?,
+        width,
+        height,
         lens,
         mount,
+        readout: (!readout.is_whole()).then_some(readout),
     })
 }
 
 /// A key that must be there.
-fn required<T>(
+pub(super) fn required<T>(
     section: &Section,
     key: &str,
     expected: &str,
@@ -105,7 +99,7 @@ fn required<T>(
     read(section, key)
 }
 
-fn side(section: &Section, key: &str) -> Option<u32> {
+pub(super) fn side(section: &Section, key: &str) -> Option<u32> {
     let expected = "the picture's size in pixels";
     let side = required(section, key, expected, |s, key| {
         s.integer(key, 1..=1_000_000)
@@ -291,6 +285,7 @@ fn linearity(section: &Section, moving: bool) -> Option<Linearity> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::read_camera_file;
 
     fn faults(text: &str) -> Vec<String> {
         let error = cameras_from_toml(text, "cameras.toml").unwrap_err();
@@ -418,7 +413,7 @@ height = 375
             faults("cameras = 3\n"),
             ["cameras.toml:1:1: cameras: found 3, expected a table"]
         );
-        let missing = read_cameras(Path::new("no/cameras.toml"), "cameras.toml").unwrap_err();
+        let missing = read_camera_file("no/cameras.toml".as_ref(), "cameras.toml").unwrap_err();
         assert_eq!(
             missing.to_string(),
             "no/cameras.toml: cannot read: no such file or folder"

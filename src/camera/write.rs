@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value, value};
 
-use super::{Cahv, Camera, Cameras, Intrinsics, Lens, Linearity, Mount};
+use super::{Cahv, Camera, Cameras, Intrinsics, Lens, Linearity, Mount, Readout, Reduction};
 use crate::error::Error;
 
-/// Writes cameras as a cameras.toml, which [`super::read_cameras`] reads back as the same cameras.
+/// Writes cameras as a cameras.toml, which [`super::read_camera_file`] reads back as the same cameras.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -31,8 +31,8 @@ pub fn cameras_to_toml(cameras: &Cameras) -> String {
 fn table(camera: &Camera) -> Table {
     let mut table = Table::new();
     table.insert("model", value(camera.lens.model()));
-    table.insert("width", value(i64::from(camera.width)));
-    table.insert("height", value(i64::from(camera.height)));
+    let whole = || Readout::whole(camera.width, camera.height);
+    readout(&mut table, &camera.readout.unwrap_or_else(whole));
     match &camera.lens {
         Lens::Pinhole(lens) => intrinsics(&mut table, lens.intrinsics()),
         Lens::BrownConrady(lens) => {
@@ -64,6 +64,37 @@ fn table(camera: &Camera) -> Table {
     );
     mount(&mut table, &camera.mount, by_vectors);
     table
+}
+
+/// The size of the sensor, and what of it the pictures show.
+fn readout(table: &mut Table, readout: &Readout) {
+    let [width, height] = readout.sensor();
+    table.insert("width", value(i64::from(width)));
+    table.insert("height", value(i64::from(height)));
+    let part = readout.subframe();
+    if [part.width, part.height] != [width, height] {
+        let mut subframe = InlineTable::new();
+        for (key, number) in [
+            ("first_u_px", part.first_u_px),
+            ("first_v_px", part.first_v_px),
+            ("width", part.width),
+            ("height", part.height),
+        ] {
+            subframe.insert(key, i64::from(number).into());
+        }
+        table.insert("subframe", value(subframe));
+    }
+    let (key, [columns, rows]) = match readout.reduction() {
+        Reduction::Full => return,
+        Reduction::Binning(by) => ("binning", by),
+        Reduction::Downsampling(by) => ("downsampling", by),
+    };
+    let factors = if columns == rows {
+        Value::from(i64::from(columns))
+    } else {
+        Value::from_iter([i64::from(columns), i64::from(rows)])
+    };
+    table.insert(key, value(factors));
 }
 
 fn intrinsics(table: &mut Table, Intrinsics { fx, fy, cx, cy }: Intrinsics) {

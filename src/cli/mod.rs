@@ -1,6 +1,7 @@
 //! The command line: what was typed, and how a run looks on a terminal. No logic of its own.
 
 mod bench_accuracy;
+mod camera;
 mod check;
 mod console;
 mod evaluate;
@@ -51,6 +52,8 @@ enum Command {
     Reproduce(reproduce::Args),
     /// Compare methods over many scenes and seeds
     BenchAccuracy(bench_accuracy::Args),
+    /// Ask a camera for the rays of pixels or the pixels of points
+    Camera(camera::Args),
 }
 
 /// Does what the command line says and tells how it went by the exit code: 0 done, 1 done with more
@@ -66,6 +69,7 @@ pub fn main() -> ExitCode {
         Command::Import(args) => import::import(&args),
         Command::Reproduce(args) => reproduce::reproduce(&args),
         Command::BenchAccuracy(args) => bench_accuracy::bench_accuracy(&args),
+        Command::Camera(args) => camera::camera(&args),
     };
     match done {
         Ok(code) => code,

@@ -177,12 +177,7 @@ impl Field {
         self.annotated(&scene, &unnamed, "views 1 and 2 fused")
     }
 
-    fn annotated(
-        &self,
-        scene: &Scene<'_>,
-        rocks: &[Rock],
-        title: &str,
-    ) -> Result<Picture, Error> {
+    fn annotated(&self, scene: &Scene<'_>, rocks: &[Rock], title: &str) -> Result<Picture, Error> {
         let mut picture = self.picture(0)?;
         let annotation = Annotation {
             title: title.to_owned(),

@@ -63,6 +63,7 @@ fn camera(lens: Lens, width: u32, height: u32) -> Camera {
         height,
         lens,
         mount: Mount::default(),
+        readout: None,
     }
 }
 

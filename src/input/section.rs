@@ -159,6 +159,34 @@ impl<'a> Section<'a> {
         })
     }
 
+    /// A whole number within bounds, which stands for two of the same, or a list of two.
+    pub fn integer_pair(
+        &self,
+        key: &str,
+        bounds: std::ops::RangeInclusive<u64>,
+    ) -> Option<[u64; 2]> {
+        let (low, high) = (bounds.start(), bounds.end());
+        let expected = format!("a whole number from {low} to {high}, or a list of two");
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked to be whole and in range"
+        )]
+        let whole = |n: &Node| match n.kind {
+            Kind::Number(x) if x.fract() == 0.0 && x >= 0.0 && bounds.contains(&(x as u64)) => {
+                Some(x as u64)
+            }
+            _ => None,
+        };
+        self.take(key, expected, |n| match &n.kind {
+            Kind::List(list) => match &list[..] {
+                [first, second] => Some([whole(first)?, whole(second)?]),
+                _ => None,
+            },
+            _ => whole(n).map(|n| [n, n]),
+        })
+    }
+
     /// A list of finite numbers whose length is one of `lengths`.
     pub fn numbers(&self, key: &str, lengths: &[usize]) -> Option<Vec<f64>> {
         let counts: Vec<String> = lengths.iter().map(usize::to_string).collect();

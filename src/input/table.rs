@@ -45,6 +45,14 @@ impl Table {
         Self::new(Box::new(std::io::Cursor::new(bytes.to_vec())), shown)
     }
 
+    /// Reads a table from any source, such as standard input.
+    ///
+    /// # Errors
+    /// As [`Table::open`].
+    pub fn from_reader(source: Box<dyn Read + Send>, shown: &str) -> Result<Self, Error> {
+        Self::new(source, shown)
+    }
+
     fn new(source: Box<dyn Read + Send>, shown: &str) -> Result<Self, Error> {
         let mut reader = ReaderBuilder::new()
             .trim(Trim::All)

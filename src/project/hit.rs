@@ -102,15 +102,13 @@ fn onto_surface(free: Vector3<f64>, normal: Vector3<f64>) -> Matrix3<f64> {
 /// surface.
 fn pixel_spread(sighting: &Sighting, view: &View, distance_m: f64) -> Matrix3<f64> {
     let LineOfSight::Ray {
-        direction_by_pixel,
-        sigma_px,
-        ..
+        by_pixel, sigma_px, ..
     } = sighting.line_of_sight
     else {
         return Matrix3::zeros();
     };
     let rotation = view.pose.enu_from_body.rotation.matrix();
-    let mut spread = rotation * direction_by_pixel * distance_m;
+    let mut spread = rotation * (by_pixel.origin + by_pixel.direction * distance_m);
     spread.column_mut(0).scale_mut(sigma_px.x);
     spread.column_mut(1).scale_mut(sigma_px.y);
     spread * spread.transpose()

@@ -1,9 +1,9 @@
 //! What a mark says by itself, before it meets the ground.
 
-use nalgebra::{Matrix3x2, Vector2};
+use nalgebra::Vector2;
 
 use super::{Miss, Settings};
-use crate::camera::Camera;
+use crate::camera::{Camera, RayJacobian};
 use crate::detection::{Detection, Mark};
 use crate::frame::{Body, Pixel, Point, Ray};
 use crate::view::View;
@@ -24,8 +24,8 @@ pub enum LineOfSight {
     Ray {
         /// The ray in body axes.
         ray: Ray<Body>,
-        /// Derivative of its unit direction by the pixel, 1/px.
-        direction_by_pixel: Matrix3x2<f64>,
+        /// Derivatives of its origin and unit direction by the pixel, in body axes.
+        by_pixel: RayJacobian,
         /// Standard deviations of column and row, pixels.
         sigma_px: Vector2<f64>,
     },
@@ -86,11 +86,11 @@ fn ray(detection: &Detection, view: &View, settings: &Settings) -> Result<LineOf
     let body_from_camera = view.body_from_camera().ok_or(Miss::NoCamera)?;
     inside(detection, camera)?;
     let aim = detection.aim_point(settings.aim).ok_or(Miss::NoCamera)?;
-    let (ray, direction_by_pixel) = camera.ray_with_jacobian(aim)?;
+    let (ray, by_pixel) = camera.ray_with_jacobian(aim)?;
     let sigma = |own: Option<f64>| own.unwrap_or(settings.noise.pixel_px);
     Ok(LineOfSight::Ray {
         ray: body_from_camera * ray,
-        direction_by_pixel: body_from_camera.rotation.matrix() * direction_by_pixel,
+        by_pixel: by_pixel.turned(&body_from_camera.rotation.matrix()),
         sigma_px: Vector2::new(sigma(detection.sigma.u_px), sigma(detection.sigma.v_px)),
     })
 }

@@ -26,5 +26,5 @@ pub fn diameter_m(
         return None;
     }
     let (_, by_pixel) = camera.ray_with_jacobian(b.aim_point(settings.aim)).ok()?;
-    Some(b.width() * by_pixel.column(0).norm() * slant_range_m)
+    Some(b.width() * by_pixel.direction.column(0).norm() * slant_range_m)
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::*;
-use crate::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
+use crate::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole, cameras_from_toml};
 use crate::detection::{Mark, MarkSigma, PixelBox};
 use crate::frame::{Enu, Geodetic, Pixel, Planet, Point, RigidTransform, Rotation, Site, Vector};
 use crate::pose::{Pose, PoseSigma};
@@ -31,7 +31,16 @@ fn camera() -> Camera {
         height: 960,
         lens: Lens::Pinhole(Pinhole::new(intrinsics).unwrap()),
         mount: Mount::new(Vector::new(0.3, -0.1, 1.8), [0.5, -0.5, 0.5, -0.5]).unwrap(),
+        readout: None,
     }
+}
+
+/// The same place and focal length, with an entrance pupil that moves by decimetres.
+fn moving_pupil() -> Camera {
+    let text = "[cameras.mast]\nmodel = \"cahvore\"\nwidth = 1280\nheight = 960\naxes = \"flu\"\n\
+        C = [0.3, -0.1, 1.8]\nA = [1, 0, 0]\nH = [640, -900, 0]\nV = [480, 0, -900]\n\
+        O = [1, 0, 0]\nR = [0, 0, 0]\nE = [0.5, 0.2, 0]\nmtype = 2\n";
+    cameras_from_toml(text, "cameras.toml").unwrap()["mast"].clone()
 }
 
 /// A view two metres up that looks down by some 20 degrees, tilted and rolled a little.
@@ -140,7 +149,24 @@ fn raised(height_m: f64, terrain: &str) -> Terrain {
 fn cases() -> Vec<(&'static str, View, Detection, Option<Terrain>)> {
     let level = || Some(Terrain::constant_height(site(), 1000.0));
     let pixel = Mark::Point(Pixel::new(500.0, 700.0));
+    let corner = Mark::Point(Pixel::new(100.0, 900.0));
+    let fisheye = || View {
+        camera: Some(Arc::new(moving_pupil())),
+        ..view(true)
+    };
     vec![
+        (
+            "moving pupil on level ground",
+            fisheye(),
+            detection(corner, None),
+            level(),
+        ),
+        (
+            "moving pupil with a range",
+            fisheye(),
+            detection(corner, Some(7.3)),
+            level(),
+        ),
         (
             "ray on level ground",
             view(true),

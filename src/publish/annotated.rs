@@ -94,7 +94,7 @@ impl Scene<'_> {
             Some(ObjectMark {
                 label: rock.rock_id.clone(),
                 centre,
-                radius_px: radius_m / (distance_m * by_pixel.column(0).norm()),
+                radius_px: radius_m / (distance_m * by_pixel.direction.column(0).norm()),
                 covariance_px,
                 detected: rock.detected_by.contains(&view_index),
                 p_exist: object.p_exist,

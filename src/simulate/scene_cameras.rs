@@ -63,6 +63,7 @@ fn short(name: &str, section: Section) -> Camera {
         height,
         lens,
         mount: mount(pitch_down, Vector::new(x, y, z)),
+        readout: None,
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::camera::{Lens, read_cameras};
+use crate::camera::{Lens, read_camera_file};
 use crate::frame::{Body, Geodetic, LocalEnu, Rotation, Site};
 
 fn scenes() -> PathBuf {
@@ -325,8 +325,9 @@ fn the_files_say_what_the_formats_mean() {
     let table = |name: &str| columns(&fs::read(folder.path().join(name)).unwrap());
     let (poses, truth) = (table("poses_true.csv"), table("truth.csv"));
     let (labels, detections) = (table("labels.csv"), table("detections.csv"));
-    let camera =
-        &read_cameras(&folder.path().join("cameras.toml"), "cameras.toml").unwrap()["mast"];
+    let camera = &read_camera_file(&folder.path().join("cameras.toml"), "cameras.toml")
+        .unwrap()
+        .cameras["mast"];
     let number =
         |t: &BTreeMap<String, Vec<String>>, c: &str, i: usize| -> f64 { t[c][i].parse().unwrap() };
     let place = |t: &BTreeMap<String, Vec<String>>, i: usize| {

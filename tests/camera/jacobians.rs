@@ -8,18 +8,34 @@ use rockmap::frame::{self, Pixel, Point};
 fn rays_by_pixels() {
     for camera in super::cameras().values() {
         for pixel in grid(camera) {
-            let (_, analytic) = camera.ray_with_jacobian(pixel).unwrap();
+            let (ray, analytic) = camera.ray_with_jacobian(pixel).unwrap();
+            let alone = camera.ray(pixel).unwrap();
+            assert_eq!((ray.origin, ray.direction), (alone.origin, alone.direction));
             let step = 0.01;
             let slope = |by: Vector2<f64>| {
                 let [ahead, behind] = [1.0, -1.0].map(|sign| {
                     let moved = Pixel::from(pixel.to_vector() + by * (sign * step));
-                    camera.ray(moved).unwrap().direction.xyz()
+                    let ray = camera.ray(moved).unwrap();
+                    (ray.origin.xyz, ray.direction.xyz())
                 });
-                (ahead - behind) / (2.0 * step)
+                let by_step = |a: Vector3<f64>, b: Vector3<f64>| (a - b) / (2.0 * step);
+                (by_step(ahead.0, behind.0), by_step(ahead.1, behind.1))
             };
-            let numeric = Matrix3x2::from_columns(&[slope(Vector2::x()), slope(Vector2::y())]);
-            let off = (analytic - numeric).norm() / numeric.norm();
+            let (by_u, by_v) = (slope(Vector2::x()), slope(Vector2::y()));
+            let direction = Matrix3x2::from_columns(&[by_u.1, by_v.1]);
+            let off = (analytic.direction - direction).norm() / direction.norm();
             assert!(off < 1e-6, "{} {pixel:?} {off:e}", camera.name);
+            // The moved pupil of a CAHVORE lens; all others have their centre.
+            let origin = Matrix3x2::from_columns(&[by_u.0, by_v.0]);
+            let off = (analytic.origin - origin).norm();
+            let bound = 1e-6 * origin.norm() + 1e-15;
+            assert!(off < bound, "{} {pixel:?} {off:e} {origin}", camera.name);
+            assert_eq!(
+                origin.norm() > 0.0,
+                camera.lens.model() == "cahvore",
+                "{} {pixel:?}",
+                camera.name
+            );
         }
     }
 }
@@ -54,7 +70,7 @@ fn on_the_axis() {
         );
         let (_, by_pixel) = camera.ray_with_jacobian(pixel).unwrap();
         // At depth 2 a step of the direction is half a step of the point.
-        let product = analytic * by_pixel * 2.0;
+        let product = analytic * by_pixel.direction * 2.0;
         assert!(
             (product - nalgebra::Matrix2::identity()).norm() < 1e-9,
             "{name}"

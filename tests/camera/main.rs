@@ -2,7 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod batches;
 mod jacobians;
+mod random;
+mod readouts;
 mod rows;
 mod tables;
 mod trips;

@@ -144,6 +144,7 @@ fn camera(lens: Lens, mount: Mount) -> Camera {
         height: 1024,
         lens,
         mount,
+        readout: None,
     }
 }
 

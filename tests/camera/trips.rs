@@ -2,7 +2,7 @@
 
 use rockmap::camera::{
     BrownConrady, Camera, Intrinsics, Lens, LensError, Mount, PanTilt, cameras_from_toml,
-    cameras_to_toml, read_cameras, write_cameras,
+    cameras_to_toml, read_camera_file, write_cameras,
 };
 use rockmap::frame::{Pixel, Point, RigidTransform, Rotation, Vector};
 
@@ -144,7 +144,10 @@ fn cameras_written_and_read_are_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cameras.toml");
     write_cameras(&path, &cameras).unwrap();
-    assert_eq!(read_cameras(&path, "cameras.toml").unwrap(), cameras);
+    assert_eq!(
+        read_camera_file(&path, "cameras.toml").unwrap().cameras,
+        cameras
+    );
 }
 
 /// JPL's vectors hold the mount, so a camera that was moved is written with moved vectors.
@@ -173,5 +176,6 @@ fn camera(lens: Lens) -> Camera {
         height: 480,
         lens,
         mount: Mount::default(),
+        readout: None,
     }
 }

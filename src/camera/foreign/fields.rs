@@ -95,6 +95,7 @@ pub(super) fn unmounted(name: String, size: [u32; 2], lens: Lens) -> Camera {
         height,
         lens,
         mount: Mount::default(),
+        readout: None,
     }
 }
 

@@ -47,6 +47,7 @@ pub(super) fn read(root: &Section, found: &mut Found) {
             height,
             lens,
             mount: Mount::from_transform(camera_from_body.inverse()),
+            readout: None,
         });
     }
 }

@@ -3,7 +3,8 @@
 use super::Found;
 use super::fields::required;
 use super::rover::{RoverImage, RoverPose, SiteLink, Vectors, after, linearity, place, step, utc};
-use super::window::{Counts, Window};
+use super::window::{Counts, Window, counts};
+use crate::camera::Camera;
 use crate::frame::{Body, Enu, Point, RigidTransform};
 use crate::input::Section;
 
@@ -27,8 +28,7 @@ pub(super) fn read(root: &Section, stem: &str, found: &mut Found) {
     let (Some(size), Some(vectors), Some(pose)) = (size, vectors, pose) else {
         return;
     };
-    let vectors = in_picture(root, vectors, found);
-    if let Some(camera) = vectors.camera(&model, "", &product, size) {
+    if let Some(camera) = camera(root, &model, &vectors, (&product, size), found) {
         found.image(RoverImage {
             image_id: product,
             time,
@@ -128,71 +128,86 @@ fn vectors(model: &Section) -> Option<Vectors> {
     Some(vectors)
 }
 
-/// The vectors in the picture's pixels: labels of subframes and of averaged pictures give them in
-/// those of the picture or of the whole detector, and do not say which.
-fn in_picture(root: &Section, vectors: Vectors, found: &mut Found) -> Vectors {
-    let window = window(root);
+/// The camera of a picture: labels of subframes and of averaged pictures give the vectors in pixels of
+/// the picture or of the whole detector, and do not say which.
+fn camera(
+    root: &Section,
+    model: &Section,
+    vectors: &Vectors,
+    (name, size): (&str, [u32; 2]),
+    found: &mut Found,
+) -> Option<Camera> {
+    let window = window(root)?;
+    let in_picture = || vectors.camera(model, "", name, size);
     let is_linearized = identity(root, "GEOMETRY_PROJECTION_TYPE").as_deref() == Some("LINEARIZED");
     if window.is_whole() || is_linearized {
-        return vectors;
+        return in_picture();
     }
-    let [x, y] = window.first;
-    let [n, m] = window.averaged;
+    let ([x, y], [n, m]) = (window.first, window.averaged);
     let part =
         format!("a picture from column {x}, row {y} of its detector, {n} x {m} pixels averaged");
     let Some(detector) = detector(root) else {
         found.note(format!(
             "{part}, of a detector of unknown size: the camera model is taken to count the picture's pixels"
         ));
-        return vectors;
+        return in_picture();
     };
-    match window.counts(&vectors, detector) {
-        Counts::Picture => {
-            found.note(format!(
-                "{part}: the camera model counts the picture's pixels"
-            ));
-            vectors
-        }
-        Counts::Detector => {
-            found.note(format!(
-                "{part}: the camera model counts the detector's pixels and is turned to the picture's"
-            ));
-            window.vectors(vectors)
-        }
+    let Ok(readout) = window.readout(detector, size) else {
+        let [columns, rows] = detector;
+        found.note(format!(
+            "{part}, which a detector of {columns} x {rows} does not hold: the camera model is taken to count the picture's pixels"
+        ));
+        return in_picture();
+    };
+    if counts(vectors, &readout) == Counts::Picture {
+        found.note(format!(
+            "{part}: the camera model counts the picture's pixels"
+        ));
+        return in_picture();
     }
+    found.note(format!(
+        "{part}: the camera model counts the detector's pixels"
+    ));
+    let whole = vectors.camera(model, "", name, detector)?;
+    let shown = whole.subframe(window.part(size)).ok()?;
+    shown.binned(window.averaged).ok()
 }
 
-fn window(root: &Section) -> Window {
+/// Which pixels of the detector the picture is made of; `None` where the label is at fault.
+fn window(root: &Section) -> Option<Window> {
     let image = image_section(root);
-    let number = |section: Option<&Section>, key: &str| {
-        let counters = section.and_then(|s| s.counters(key));
-        counters
-            .and_then(|c| c.first().copied())
-            .filter(|x| *x >= 1.0)
-    };
     let state = root.tables("INSTRUMENT_STATE_PARMS");
-    let averaged = |key: &str| {
-        number(state.first(), key)
-            .or(number(image.as_ref(), key))
-            .unwrap_or(1.0)
+    let number = |section: Option<&Section>, key: &str| {
+        let counters = section?.counters(key)?;
+        counters.first().copied().filter(|x| *x >= 1.0)
     };
-    let first = |key: &str| number(image.as_ref(), key).unwrap_or(1.0) - 1.0;
-    Window {
-        first: [first("FIRST_LINE_SAMPLE"), first("FIRST_LINE")],
+    let told = |sections: [Option<&Section>; 2], key: &str| {
+        let told = sections.into_iter().find_map(|s| number(s, key));
+        let whole = told.map_or(Some(1), whole_number);
+        if let (None, Some(x)) = (whole, told) {
+            root.fault(key, x, "a whole number above zero");
+        }
+        whole
+    };
+    let averaged = |key| told([state.first(), image.as_ref()], key);
+    let first = |key| told([image.as_ref(), None], key).map(|n| n - 1);
+    Some(Window {
+        first: [first("FIRST_LINE_SAMPLE")?, first("FIRST_LINE")?],
         averaged: [
-            averaged("PIXEL_AVERAGING_WIDTH"),
-            averaged("PIXEL_AVERAGING_HEIGHT"),
+            averaged("PIXEL_AVERAGING_WIDTH")?,
+            averaged("PIXEL_AVERAGING_HEIGHT")?,
         ],
-    }
+    })
 }
 
 /// Columns and rows of the detector: as the label says, or the 1024 of the engineering cameras.
-fn detector(root: &Section) -> Option<[f64; 2]> {
+fn detector(root: &Section) -> Option<[u32; 2]> {
     let tables = ["INSTRUMENT_STATE_PARMS", "IMAGE", "IMAGE_DATA"].map(|key| root.tables(key));
     let told = |key: &str| {
         let mut all = tables.iter().flatten();
         all.find_map(|s| s.counters(key))
             .and_then(|c| c.first().copied())
+            .and_then(whole_number)
     };
     if let (Some(columns), Some(rows)) = (
         told("DETECTOR_LINE_SAMPLES").or(told("DETECTOR_SAMPLES")),
@@ -205,7 +220,7 @@ fn detector(root: &Section) -> Option<[f64; 2]> {
     engineering
         .iter()
         .any(|name| instrument.contains(name))
-        .then_some([1024.0, 1024.0])
+        .then_some([1024, 1024])
 }
 
 /// A coordinate system of the label: where its origin is in another, and how it is turned.
@@ -239,7 +254,9 @@ fn pose(root: &Section, model: &Section, found: &mut Found) -> Option<RoverPose>
     let mut total: RigidTransform<Enu, Body> = RigidTransform::identity();
     for _ in 0..LONGEST_CHAIN {
         if name == "SITE_FRAME" {
-            let site = index.and_then(|i| i.first().copied()).and_then(site_number);
+            let site = index
+                .and_then(|i| i.first().copied())
+                .and_then(whole_number);
             return Some(RoverPose::of_ned(&total, site));
         }
         let Some(frame) = frames.iter().find(|f| f.name == name) else {
@@ -276,7 +293,7 @@ fn link(root: &Section) -> Option<SiteLink> {
     let site = groups
         .into_iter()
         .find_map(|key| root.tables(key).into_iter().next())?;
-    let number = |key: &str| site.counters(key)?.first().copied().and_then(site_number);
+    let number = |key: &str| site.counters(key)?.first().copied().and_then(whole_number);
     let offset = site.counters("ORIGIN_OFFSET_VECTOR")?;
     let offset = place(<[f64; 3]>::try_from(offset).ok()?);
     let turned = site.counters("ORIGIN_ROTATION_QUATERNION");
@@ -288,7 +305,7 @@ fn link(root: &Section) -> Option<SiteLink> {
     })
 }
 
-pub(super) fn site_number(x: f64) -> Option<u32> {
+pub(super) fn whole_number(x: f64) -> Option<u32> {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

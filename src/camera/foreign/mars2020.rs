@@ -221,7 +221,7 @@ fn pose(record: &Section) -> Option<RoverPose> {
     let site = record.counters("site").and_then(|c| c.first().copied());
     let site = site.or_else(|| record.text("site")?.parse().ok());
     Some(RoverPose {
-        site: site.and_then(super::label::site_number),
+        site: site.and_then(super::label::whole_number),
         place: xyz.map(place),
         attitude: turned.flatten(),
     })

@@ -3,7 +3,7 @@
 
 use super::Found;
 use super::fields::{NO_MOUNT, fisheye, of_matrix, required, side, spelling, standard, unmounted};
-use crate::camera::{Intrinsics, Lens};
+use crate::camera::{BadReadout, Camera, Intrinsics, Lens, Subframe};
 use crate::input::Section;
 
 const MODELS: [&str; 3] = ["plumb_bob", "rational_polynomial", "equidistant"];
@@ -25,13 +25,9 @@ pub(super) fn read(root: &Section, stem: &str, found: &mut Found) {
     let used_up = (|| {
         let (model, distortion) = (model?, distortion?);
         let lens = lens(root, key, &model, intrinsics?, &distortion)?;
-        let mut size = [width?, height?];
-        let lens = windowed(root, lens, &mut size)?;
-        found.cameras.push(unmounted(
-            name.unwrap_or_else(|| stem.to_owned()),
-            size,
-            lens,
-        ));
+        let name = name.unwrap_or_else(|| stem.to_owned());
+        let camera = unmounted(name, [width?, height?], lens);
+        found.cameras.push(read_out(root, camera)?);
         Some(())
     })();
     if used_up.is_some() {
@@ -105,32 +101,33 @@ fn lens(
     }
 }
 
-/// The calibration is of the full sensor; a message may tell of a part of it, or of pixels that were
-/// averaged or left out, which this reader refuses rather than guess which.
-fn windowed(root: &Section, lens: Lens, size: &mut [u32; 2]) -> Option<Lens> {
-    for key in ["binning_x", "binning_y"] {
-        if root.has(key) {
-            root.integer(key, 0..=1)?;
+/// The calibration is of the full sensor; a message may tell of a part of it, in the sensor's pixels,
+/// and of pixels that are averaged into one (`sensor_msgs/CameraInfo`: `roi`, `binning_x`).
+fn read_out(root: &Section, camera: Camera) -> Option<Camera> {
+    let number = |section: &Section, key: &str| {
+        if !section.has(key) {
+            return Some(0);
         }
-    }
+        u32::try_from(section.integer(key, 0..=1_000_000)?).ok()
+    };
+    let bad = |key, bad: BadReadout| root.problem(key, bad.to_string());
+    let mut camera = camera;
     if root.has("roi") {
-        let part = root.section("roi");
-        for key in ["x_offset", "y_offset"] {
-            if part.has(key) {
-                part.integer(key, 0..=0)?;
-            }
-        }
-        for (key, full) in [("width", size[0]), ("height", size[1])] {
-            let given = part.number(key, 0.0.., "a number not below zero");
-            if given.is_some_and(|x| x != 0.0 && x != f64::from(full)) {
-                part.fault(
-                    key,
-                    given.unwrap_or(0.0),
-                    format!("0 or {full}, the whole picture"),
-                );
-                return None;
-            }
+        let roi = root.section("roi");
+        let part = Subframe {
+            first_u_px: number(&roi, "x_offset")?,
+            first_v_px: number(&roi, "y_offset")?,
+            width: number(&roi, "width")?,
+            height: number(&roi, "height")?,
+        };
+        // All zero is the whole sensor.
+        if [part.first_u_px, part.first_v_px, part.width, part.height] != [0; 4] {
+            let cut = camera.subframe(part);
+            camera = cut.map_err(|error| bad("roi", error)).ok()?;
         }
     }
-    Some(lens)
+    // Zero is one.
+    let binning = ["binning_x", "binning_y"].map(|key| number(root, key).map(|n| n.max(1)));
+    let binned = camera.binned([binning[0]?, binning[1]?]);
+    binned.map_err(|error| bad("binning_x", error)).ok()
 }

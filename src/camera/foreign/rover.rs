@@ -150,6 +150,7 @@ impl Vectors {
             height,
             lens,
             mount,
+            readout: None,
         })
     }
 }

@@ -60,6 +60,27 @@ fn ros_files_see_as_opencv_does() {
     ));
 }
 
+/// By `sensor_msgs/CameraInfo` the region counts in pixels of the sensor, which are averaged after it is
+/// cut: column 41.5 of the sensor is the centre of the block of columns 41 and 42, the first of those.
+#[test]
+fn ros_messages_of_a_binned_region() {
+    let text = sample("ros-message.yaml");
+    let whole = read("ros-message.yaml", &text).unwrap();
+    let text = text
+        .replace("binning_x: 0", "binning_x: 2")
+        .replace("binning_y: 0", "binning_y: 3")
+        .replace("x_offset: 0", "x_offset: 41")
+        .replace("y_offset: 0", "y_offset: 30")
+        .replace("  height: 0", "  height: 300")
+        .replace("  width: 0", "  width: 501");
+    let part = read("ros-message.yaml", &text).unwrap();
+    let (whole, part) = (&whole.cameras["ros-message"], &part.cameras["ros-message"]);
+    assert_eq!((part.width, part.height), (250, 100));
+    let ray = |camera: &Camera, u, v| camera.ray(Pixel::new(u, v)).unwrap().direction;
+    assert_eq!(ray(part, 0.0, 0.0), ray(whole, 41.5, 31.0));
+    assert_eq!(ray(part, 100.0, 50.0), ray(whole, 241.5, 181.0));
+}
+
 #[test]
 fn faults_of_ros_files() {
     assert_eq!(
@@ -98,12 +119,16 @@ fn faults_of_ros_files() {
         ["ros.yaml: image_width: found nothing, expected the picture's size in pixels"]
     );
     assert_eq!(
-        faults("ros-message.yaml", "binning_x: 0", "binning_x: 2"),
-        ["ros-message.yaml:14:1: binning_x: found 2, expected a whole number from 0 to 1"]
+        faults("ros-message.yaml", "binning_x: 0", "binning_x: 641"),
+        [
+            "ros-message.yaml:14:1: binning_x: found 641 by 1, expected whole numbers from 1 to the 640x480 pixels there are"
+        ]
     );
     assert_eq!(
         faults("ros-message.yaml", "  width: 0", "  width: 320"),
-        ["ros-message.yaml:20:3: roi.width: found 320, expected 0 or 640, the whole picture"]
+        [
+            "ros-message.yaml:16:1: roi: found a subframe of 320x0 from column 0 and row 0, expected a part of the 640x480 there are"
+        ]
     );
     let broken = faults("ros.yaml", "data: [905.512816,", "data: [[905.512816,");
     assert!(broken[0].starts_with("ros.yaml:"), "{broken:?}");
@@ -330,7 +355,7 @@ fn labels_tell_camera_and_pose() {
     assert_eq!(
         file.notes,
         [
-            "2n.img: a picture from column 0, row 512 of its detector, 2 x 2 pixels averaged: the camera model counts the detector's pixels and is turned to the picture's"
+            "2n.img: a picture from column 0, row 512 of its detector, 2 x 2 pixels averaged: the camera model counts the detector's pixels"
         ]
     );
     let pose = image.pose;

@@ -220,8 +220,7 @@ impl Run {
         let mut config = self.config.clone();
         config.fusion.method = method;
         let mut clock = Clock::start();
-        let Mapped { ground, fusion } =
-            pipeline::map(&config, &self.inputs, &mut clock, &Silent)?;
+        let Mapped { ground, fusion } = pipeline::map(&config, &self.inputs, &mut clock, &Silent)?;
         let fusing = clock.stages.iter().find(|s| s.stage == "fuse");
         let seconds = fusing.map_or(0.0, |s| s.seconds);
         let scene = ground.scene(&config, &self.inputs);

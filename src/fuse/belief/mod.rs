@@ -1,5 +1,6 @@
 //! Belief fusion.
 mod algebra;
+mod associate;
 mod curve;
 mod data;
 mod engine;
@@ -16,10 +17,9 @@ mod pairs;
 mod register;
 mod sequence;
 mod single;
-mod associate;
 mod solve;
 
-pub use outcome::{fuse_belief, Belief, BeliefObject, BeliefEvidence, Single};
+pub use outcome::{Belief, BeliefEvidence, BeliefObject, Single, fuse_belief};
 
 /// How poses are corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

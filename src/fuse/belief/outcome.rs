@@ -3,11 +3,11 @@
 use nalgebra::{Matrix3, Matrix6, Vector6};
 use serde::Serialize;
 
+use super::BeliefSettings;
 use super::algebra::{Square4, to_matrix6};
 use super::engine::Engine;
 use super::evidence::{Evidence, probability};
 use super::solve::Robust;
-use super::BeliefSettings;
 use crate::adjust::Problem;
 use crate::frame::{Enu, Point};
 use crate::fuse::Member;
@@ -104,7 +104,9 @@ pub fn fuse_belief(problem: &Problem<'_>, settings: &BeliefSettings) -> Belief {
     let (mut evidence, mut rounds, mut converged) = engine.refine();
     let mut best = engine.objective(&evidence);
     let debug = std::env::var("DEBUGJ").is_ok();
-    if debug { eprintln!("J first {best:.1}"); }
+    if debug {
+        eprintln!("J first {best:.1}");
+    }
     let n_pass = super::learn::knob(4, 1.0) as usize;
     for pass in 1..n_pass {
         let mut again = fresh.clone();
@@ -113,11 +115,15 @@ pub fn fuse_belief(problem: &Problem<'_>, settings: &BeliefSettings) -> Belief {
         again.settle();
         again.weigh_background();
         let mut order = order.clone();
-        if pass == 2 { order.reverse(); }
+        if pass == 2 {
+            order.reverse();
+        }
         again.sequence(&order);
         let (e, r, c) = again.refine();
         let j = again.objective(&e);
-        if debug { eprintln!("J pass {pass} {j:.1}"); }
+        if debug {
+            eprintln!("J pass {pass} {j:.1}");
+        }
         if j > best {
             best = j;
             engine = again;

@@ -133,8 +133,8 @@ impl Engine<'_> {
                 taken.push(object);
                 map.own[c.look] = Some(object);
                 let clutter = self.background[c.look].clutter;
-                map.log_odds[object] += c.ln_likelihood - clutter
-                    + found.pairs[c.pair].pair.p_detect.max(0.02).ln();
+                map.log_odds[object] +=
+                    c.ln_likelihood - clutter + found.pairs[c.pair].pair.p_detect.max(0.02).ln();
             }
         }
         for pair in &found.pairs {
@@ -176,8 +176,8 @@ impl Engine<'_> {
                 continue;
             };
             let detection = &self.looks[look];
-            let weight = map.worth[look]
-                * robust_weight(&e, &self.looseness[look], detection.n_rows());
+            let weight =
+                map.worth[look] * robust_weight(&e, &self.looseness[look], detection.n_rows());
             let mut a = [[0.0; 4]; 4];
             super::algebra::add_object_information(&mut a, &h, &m, n, weight);
             for i in 0..4 {
@@ -204,7 +204,9 @@ impl Engine<'_> {
             let looks = moving.iter().flat_map(|&v| self.looks_of(v));
             looks.filter_map(|look| map.own[look]).collect()
         } else {
-            self.looks_of(view).filter_map(|look| map.own[look]).collect()
+            self.looks_of(view)
+                .filter_map(|look| map.own[look])
+                .collect()
         };
         touched.sort_unstable();
         touched.dedup();
@@ -269,5 +271,5 @@ impl Engine<'_> {
 /// Registration never takes an object for certain, one way or the other: its own beginnings are
 /// rough.
 fn likely(log_odds: f64) -> f64 {
-    probability(log_odds).clamp(super::learn::knob(7, 0.1), super::learn::knob(8,0.9))
+    probability(log_odds).clamp(super::learn::knob(7, 0.1), super::learn::knob(8, 0.9))
 }

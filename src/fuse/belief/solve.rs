@@ -89,7 +89,13 @@ impl Engine<'_> {
         for row in &rows {
             let k = row.object;
             nearest_m[k] = nearest_m[k].min(row.range_m);
-            add_object_information(&mut information[k], &row.by_object, &row.information, row.n, 1.0);
+            add_object_information(
+                &mut information[k],
+                &row.by_object,
+                &row.information,
+                row.n,
+                1.0,
+            );
             let toward = row.toward();
             for (p, h) in pull[k].iter_mut().zip(row.object_pull(&toward)) {
                 *p += h;
@@ -100,7 +106,10 @@ impl Engine<'_> {
             self.joint(&part, &rows, &information, &pull, marginals)
         } else {
             let steps = conditional.iter().zip(&pull).map(|(c, b)| times(c, b));
-            (steps.collect(), marginals.then(|| (conditional.clone(), Vec::new())))
+            (
+                steps.collect(),
+                marginals.then(|| (conditional.clone(), Vec::new())),
+            )
         };
         let mut move_m = 0.0f64;
         for ((x, step), nearest_m) in part.objects.iter_mut().zip(&steps).zip(&nearest_m) {
@@ -135,7 +144,11 @@ impl Engine<'_> {
                 Robust::Contaminated => robust_weight(&e, variances, look.n_rows()),
                 Robust::Scale(c2) => {
                     let m2: f64 = (0..2).map(|r| e[r] * e[r] / variances[r]).sum::<f64>()
-                        + if look.is_bearing() { e[3] * e[3] / variances[3] } else { 0.0 };
+                        + if look.is_bearing() {
+                            e[3] * e[3] / variances[3]
+                        } else {
+                            0.0
+                        };
                     (c2 / (c2 + m2)).powi(2)
                 }
             };
@@ -170,11 +183,19 @@ impl Engine<'_> {
             })
         };
         let pairs = part.edges.par_iter().zip(part.worth);
-        pairs.map(row).collect::<Vec<_>>().into_iter().flatten().collect()
+        pairs
+            .map(row)
+            .collect::<Vec<_>>()
+            .into_iter()
+            .flatten()
+            .collect()
     }
 
     /// Objects and poses together; the poses move here, the steps of the objects are returned.
-    #[expect(clippy::type_complexity, reason = "steps, and covariances where asked for")]
+    #[expect(
+        clippy::type_complexity,
+        reason = "steps, and covariances where asked for"
+    )]
     fn joint(
         &mut self,
         part: &Part<'_>,
@@ -332,7 +353,12 @@ impl Engine<'_> {
     }
 
     /// Gauss-Newton steps of all objects and poses; with marginal covariances of the last if asked.
-    pub(super) fn adjust(&mut self, steps: usize, robust: Robust, marginals: bool) -> Option<Stepped> {
+    pub(super) fn adjust(
+        &mut self,
+        steps: usize,
+        robust: Robust,
+        marginals: bool,
+    ) -> Option<Stepped> {
         let edges = std::mem::take(&mut self.edges);
         let mut objects = std::mem::take(&mut self.objects);
         let of: Vec<(usize, usize)> = edges
@@ -378,12 +404,7 @@ impl Row {
     }
 
     /// Adds to a pose's information; the rows' own is diagonal where poses move.
-    fn add_to_pose(
-        &self,
-        a: &mut SMatrix<f64, 6, 6>,
-        b: &mut Vector6<f64>,
-        toward: &[f64; 4],
-    ) {
+    fn add_to_pose(&self, a: &mut SMatrix<f64, 6, 6>, b: &mut Vector6<f64>, toward: &[f64; 4]) {
         for r in 0..self.n {
             let w = self.information[r][r];
             if w == 0.0 {
@@ -417,13 +438,7 @@ impl Row {
 }
 
 /// Adds `w h^T m h` to the information of a pose.
-pub(super) fn add_pose_information(
-    a: &mut Square6,
-    h: &ByPose,
-    m: &Square4,
-    n: usize,
-    w: f64,
-) {
+pub(super) fn add_pose_information(a: &mut Square6, h: &ByPose, m: &Square4, n: usize, w: f64) {
     for r in 0..n {
         let mut left = [0.0; 6];
         for s in 0..n {
@@ -494,4 +509,3 @@ fn objects_kept(
     let diagonals = marginals.then(|| solved.covariances());
     Some((solved.kept, solved.eliminated, diagonals))
 }
-
