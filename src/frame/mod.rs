@@ -25,6 +25,7 @@
 mod axes;
 mod covariance;
 mod crs;
+mod crs_text;
 mod geodetic;
 mod pixel;
 mod point;
@@ -34,6 +35,7 @@ mod transform;
 pub use axes::{Body, Camera, Ecef, Enu, LocalEnu};
 pub use covariance::{Ellipse, covariance_ellipse};
 pub use crs::{Crs, CrsError};
+pub use crs_text::CrsText;
 pub use geodetic::{Ellipsoid, Geodetic, Planet};
 pub use pixel::Pixel;
 pub use point::{Direction, Point, Ray, Vector};

@@ -32,6 +32,7 @@ pub(super) fn run_json(
     fusion: Option<&Fusion>,
     run_id: &str,
     summary: &Summary,
+    outputs: &[String],
 ) -> String {
     let origin = inputs.site.origin();
     let manifest = json!({
@@ -58,6 +59,7 @@ pub(super) fn run_json(
             "objects": summary.n_objects,
             "pictures_annotated": summary.n_annotated,
         },
+        "outputs": outputs,
         "warnings": summary.warnings,
         "solver": fusion.map(|f| &f.solver),
     });

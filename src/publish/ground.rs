@@ -40,11 +40,11 @@ impl Cartographer<'_> {
     }
 
     /// A line, cut along the antimeridian where it crosses it.
-    pub(super) fn line(&self, places: &[Geodetic]) -> Vec<Vec<Coord<f64>>> {
+    pub(super) fn line(places: &[Geodetic]) -> Vec<Vec<Coord<f64>>> {
         let mut parts = vec![Vec::new()];
         let mut last: Option<Coord<f64>> = None;
         for place in places {
-            let at = super::geojson::lon_lat(*place);
+            let at = super::layer::lon_lat(*place);
             if let Some(before) = last
                 && (at.x - before.x).abs() > 180.0
             {
@@ -115,7 +115,7 @@ impl Cartographer<'_> {
         let mut out: Vec<Coord<f64>> = Vec::new();
         for &coord in ring.coords() {
             let place = self.geodetic(coord);
-            let mut at = super::geojson::lon_lat(place);
+            let mut at = super::layer::lon_lat(place);
             if let Some(side) = side {
                 at.x = side.snapped(at.x);
                 if let Some(&before) = out.last()

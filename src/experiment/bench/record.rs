@@ -227,6 +227,6 @@ impl Run {
         let seconds = start.elapsed().as_secs_f64();
         let scene = self.ground.scene(&config, &self.inputs);
         let map = scene.rocks_geojson(&scene.rock_map(&fusion), "");
-        Ok((map_from_bytes(&map.content, map.name)?, seconds))
+        Ok((map_from_bytes(&map.content, &map.name)?, seconds))
     }
 }
