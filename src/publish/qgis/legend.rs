@@ -41,7 +41,7 @@ const AMBER: Rgba = (217, 119, 6, 200);
 pub(super) fn rules(layer: &Layer) -> Vec<Rule> {
     match layer.name {
         "rocks" => rocks(layer),
-        "ellipses" => one(Symbol::area((190, 24, 93, 20), (190, 24, 93, 200), 0.2)),
+        "ellipses" => one(Symbol::area((190, 24, 93, 0), (190, 24, 93, 220), 0.2)),
         "footprints" => one(Symbol::area((14, 165, 233, 9), (14, 116, 170, 60), 0.12)),
         "views" => one(Symbol::sign(
             "triangle",

@@ -12,7 +12,7 @@ use legend::{Rule, rules};
 use xml::escaped;
 
 /// Labels appear at scales larger than one to this.
-const LABELS_FROM: u32 = 400;
+const LABELS_FROM: u32 = 75;
 
 /// A layer's style as a QML file.
 pub fn qml(layer: &Layer) -> String {
@@ -80,7 +80,7 @@ fn labels(layer: &Layer) -> String {
     format!(
         "<labeling type=\"simple\">\n<settings calloutType=\"simple\">\n\
          <text-style fieldName=\"rock_id\" isExpression=\"0\" fontFamily=\"Noto Sans\" \
-         fontSize=\"8\" fontSizeUnit=\"Point\" textColor=\"31,41,55,255\" textOpacity=\"1\">\n\
+         fontSize=\"8\" fontWeight=\"63\" fontSizeUnit=\"Point\" textColor=\"31,41,55,255\" textOpacity=\"1\">\n\
          <text-buffer bufferDraw=\"1\" bufferSize=\"0.8\" bufferSizeUnits=\"MM\" \
          bufferColor=\"255,255,255,230\" bufferOpacity=\"1\"/>\n</text-style>\n\
          <placement placement=\"6\" dist=\"0.6\" distUnits=\"MM\" offsetType=\"1\" \

@@ -28,13 +28,16 @@ pub struct Project<'a> {
 
 /// Layers from the top of the map to its bottom; those first that others must not cover.
 const ORDER: [&str; 6] = [
-    "rocks",
     "ellipses",
+    "rocks",
     "detections",
     "views",
     "traverse",
     "footprints",
 ];
+
+/// What the ids of layers begin with: QGIS ignores ids of ten characters or fewer.
+const ID: &str = "rockmap_";
 
 /// The least extent of the map, metres.
 const LEAST_EXTENT_M: f64 = 10.0;
@@ -80,15 +83,22 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
          <qgis version=\"3.22.0\" projectname=\"{title}\">\n<homePath path=\"\"/>\n\
          <title>{title}</title>\n<projectCrs>\n{local}</projectCrs>\n<layer-tree-group>\n"
     );
+    let has_rocks = layers.iter().any(|l| l.name == "rocks");
+    let is_hidden = |layer: &Layer| layer.name == "detections" && has_rocks;
     // Writing to a String cannot fail.
     for layer in &layers {
         let _ = writeln!(
             text,
-            "<layer-tree-layer id=\"{0}\" name=\"{1}\" providerKey=\"ogr\" source=\"{2}\" \
-             checked=\"Qt::Checked\" expanded=\"{3}\"/>",
+            "<layer-tree-layer id=\"{ID}{0}\" name=\"{1}\" providerKey=\"ogr\" source=\"{2}\" \
+             checked=\"{3}\" expanded=\"{4}\"/>",
             layer.name,
             escaped(layer.title),
             escaped(&source(project.format, layer)),
+            if is_hidden(layer) {
+                "Qt::Unchecked"
+            } else {
+                "Qt::Checked"
+            },
             i32::from(layer.name == "rocks"),
         );
     }
@@ -108,7 +118,9 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
         "</projectlayers>\n<properties>\n<Paths>\n<Absolute type=\"bool\">false</Absolute>\n\
          </Paths>\n<Gui>\n<CanvasColorRedPart type=\"int\">247</CanvasColorRedPart>\n\
          <CanvasColorGreenPart type=\"int\">244</CanvasColorGreenPart>\n\
-         <CanvasColorBluePart type=\"int\">238</CanvasColorBluePart>\n</Gui>\n</properties>\n\
+         <CanvasColorBluePart type=\"int\">238</CanvasColorBluePart>\n</Gui>\n\
+         <SpatialRefSys>\n<ProjectionsEnabled type=\"int\">1</ProjectionsEnabled>\n\
+         </SpatialRefSys>\n</properties>\n\
          <ProjectViewSettings UseProjectScales=\"0\">\n<DefaultViewExtent xmin=\"{:.3}\" \
          ymin=\"{:.3}\" xmax=\"{:.3}\" ymax=\"{:.3}\">\n{local}</DefaultViewExtent>\n\
          </ProjectViewSettings>\n</qgis>\n",
@@ -196,7 +208,7 @@ fn map_layer(format: Format, layer: &Layer, crs: &CrsText) -> String {
     };
     format!(
         "<maplayer type=\"vector\" geometry=\"{geometry}\" hasScaleBasedVisibilityFlag=\"0\" \
-         labelsEnabled=\"1\">\n<id>{}</id>\n<datasource>{}</datasource>\n\
+         labelsEnabled=\"1\">\n<id>{ID}{}</id>\n<datasource>{}</datasource>\n\
          <layername>{}</layername>\n<srs>\n{}</srs>\n\
          <provider encoding=\"UTF-8\">ogr</provider>\n{}</maplayer>\n",
         layer.name,

@@ -139,7 +139,7 @@ fn stone(fill: Rgba) -> Content {
         ("size", "0.2".to_owned()),
         // Metres on the ground, at least 2 mm on the screen.
         ("size_unit", "RenderMetersInMapUnits".to_owned()),
-        ("size_map_unit_scale", "3x:0,0,1,0,2,0".to_owned()),
+        ("size_map_unit_scale", "3x:0,0,1,2,0,0".to_owned()),
         ("scale_method", "diameter".to_owned()),
     ];
     (
