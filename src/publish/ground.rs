@@ -1,7 +1,9 @@
 //! Areas and lines of the site's ENU as longitudes and latitudes, cut where the map is.
 
-use geo::{BooleanOps, Coord, LineString, MultiPolygon, Polygon};
+use geo::{BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon, Rect};
 
+use super::layer::lon_lat;
+use super::simple::simple;
 use crate::frame::{Enu, Geodetic, Point, Site};
 
 /// Turns horizontal ENU into longitudes and latitudes. `up_m` says how high the ground is at a
@@ -21,22 +23,57 @@ impl Cartographer<'_> {
     }
 
     /// An area, cut along the antimeridian where it crosses it and closed over the pole where it
-    /// holds it (RFC 7946, section 3.1.9).
+    /// holds it (RFC 7946, section 3.1.9). Its corners have the decimals of the map, and every
+    /// polygon is simple.
     pub(super) fn area(&self, area: &MultiPolygon<f64>) -> MultiPolygon<f64> {
         let mut out = Vec::new();
         for polygon in area {
-            if !self.meets_the_cut(polygon) {
-                out.push(self.polygon(polygon, None));
-                continue;
-            }
-            let [east, west] = self.hemispheres();
-            for (hemisphere, side) in [(east, Side::East), (west, Side::West)] {
-                for part in &polygon.intersection(&hemisphere) {
-                    out.push(self.polygon(part, Some(side)));
-                }
+            match self.unrolled(polygon) {
+                Some(unrolled) => out.extend(on_the_map(&unrolled)),
+                None => out.extend(self.around_the_pole(polygon)),
             }
         }
         MultiPolygon::new(out)
+    }
+
+    /// A polygon with longitudes that do not jump, whatever they add up to; `None` where it goes
+    /// around a pole.
+    fn unrolled(&self, polygon: &Polygon<f64>) -> Option<Polygon<f64>> {
+        let exterior = self.unrolled_ring(polygon.exterior())?;
+        let bounds = exterior.bounding_rect()?;
+        let mut holes = Vec::new();
+        for hole in polygon.interiors() {
+            let hole = self.unrolled_ring(hole)?;
+            let middle = hole.bounding_rect()?.center().x;
+            let turns = ((bounds.center().x - middle) / 360.0).round();
+            holes.push(moved(&hole, turns * 360.0));
+        }
+        Some(Polygon::new(exterior, holes))
+    }
+
+    /// A straight edge that misses the pole turns by less than half of the map.
+    fn unrolled_ring(&self, ring: &LineString<f64>) -> Option<LineString<f64>> {
+        let mut out: Vec<Coord<f64>> = Vec::new();
+        for &coord in ring.coords() {
+            let mut at = lon_lat(self.geodetic(coord));
+            if let Some(before) = out.last() {
+                at.x += ((before.x - at.x) / 360.0).round() * 360.0;
+            }
+            out.push(at);
+        }
+        let (first, last) = (out.first()?, out.last()?);
+        ((last.x - first.x).abs() < 180.0).then(|| LineString::new(out))
+    }
+
+    fn around_the_pole(&self, polygon: &Polygon<f64>) -> Vec<Polygon<f64>> {
+        let [east, west] = self.hemispheres();
+        let sides = [(east, Side::East), (west, Side::West)];
+        let parts = sides.into_iter().flat_map(|(hemisphere, side)| {
+            let half = polygon.intersection(&hemisphere);
+            let drawn = half.iter().map(|part| self.polygon(part, side)).collect();
+            simple(&MultiPolygon::new(drawn)).0
+        });
+        parts.collect()
     }
 
     /// A line, cut along the antimeridian where it crosses it.
@@ -44,7 +81,7 @@ impl Cartographer<'_> {
         let mut parts = vec![Vec::new()];
         let mut last: Option<Coord<f64>> = None;
         for place in places {
-            let at = super::layer::lon_lat(*place);
+            let at = lon_lat(*place);
             if let Some(before) = last
                 && (at.x - before.x).abs() > 180.0
             {
@@ -64,17 +101,6 @@ impl Cartographer<'_> {
         }
         parts.retain(|part| part.len() > 1);
         parts
-    }
-
-    /// Whether a polygon crosses the antimeridian or holds a pole: then some edge of it steps over
-    /// half the map.
-    fn meets_the_cut(&self, polygon: &Polygon<f64>) -> bool {
-        let lons: Vec<f64> = polygon
-            .exterior()
-            .coords()
-            .map(|&c| self.geodetic(c).lon_deg())
-            .collect();
-        lons.windows(2).any(|w| (w[1] - w[0]).abs() > 180.0)
     }
 
     /// The two sides of the plane through the axis and the meridians 0 and 180, in the tangent
@@ -105,37 +131,82 @@ impl Cartographer<'_> {
         [side(1.0), side(-1.0)]
     }
 
-    fn polygon(&self, polygon: &Polygon<f64>, side: Option<Side>) -> Polygon<f64> {
+    fn polygon(&self, polygon: &Polygon<f64>, side: Side) -> Polygon<f64> {
         let ring = |ring: &LineString<f64>| self.ring(ring, side);
         let holes = polygon.interiors().iter().map(ring).collect();
         Polygon::new(ring(polygon.exterior()), holes)
     }
 
-    fn ring(&self, ring: &LineString<f64>, side: Option<Side>) -> LineString<f64> {
+    fn ring(&self, ring: &LineString<f64>, side: Side) -> LineString<f64> {
         let mut out: Vec<Coord<f64>> = Vec::new();
         for &coord in ring.coords() {
             let place = self.geodetic(coord);
-            let mut at = super::layer::lon_lat(place);
-            if let Some(side) = side {
-                at.x = side.snapped(at.x);
-                if let Some(&before) = out.last()
-                    && (at.x - before.x).abs() > 90.0
-                {
-                    // The cut runs over the pole: on the map it is an edge along the pole's
-                    // latitude.
-                    let pole = 90f64.copysign(place.lat);
-                    out.push(Coord {
-                        x: before.x,
-                        y: pole,
-                    });
-                    out.push(Coord { x: at.x, y: pole });
-                }
+            let mut at = lon_lat(place);
+            at.x = side.snapped(at.x);
+            if let Some(&before) = out.last()
+                && (at.x - before.x).abs() > 90.0
+            {
+                // The cut runs over the pole: on the map it is an edge along the pole's
+                // latitude.
+                let pole = 90f64.copysign(place.lat);
+                out.push(Coord {
+                    x: before.x,
+                    y: pole,
+                });
+                out.push(Coord { x: at.x, y: pole });
             }
             out.push(at);
         }
-        out.dedup();
         LineString::new(out)
     }
+}
+
+/// An unrolled polygon on the map of longitudes from -180 to 180: what lies beyond an edge of the
+/// map comes in at the other one.
+fn on_the_map(unrolled: &Polygon<f64>) -> Vec<Polygon<f64>> {
+    let Some(bounds) = unrolled.bounding_rect() else {
+        return Vec::new();
+    };
+    let (min, max) = (bounds.min(), bounds.max());
+    if min.x >= -180.0 && max.x <= 180.0 {
+        return simple(&unrolled.clone().into()).0;
+    }
+    // As narrow as it may be: a wider box would cost the intersection decimals.
+    let margin = bounds.width().max(bounds.height());
+    // What the intersection's 30 bits make of a longitude on the cut.
+    let hair_deg = 1e-8 * margin + 1e-11;
+    let turns = [-360.0_f64, 0.0, 360.0].into_iter();
+    let parts = turns.flat_map(|turn| {
+        let west = (turn - 180.0).max(min.x - margin);
+        let east = (turn + 180.0).min(max.x + margin);
+        if west >= max.x || east <= min.x {
+            return Vec::new();
+        }
+        let page = Rect::new((west, min.y - margin), (east, max.y + margin));
+        let part = unrolled.intersection(&page.to_polygon());
+        simple(&part.map_coords(|c| Coord {
+            x: to_edge(c.x - turn, hair_deg),
+            y: c.y,
+        }))
+        .0
+    });
+    parts.collect()
+}
+
+/// A longitude, on the edge of the map where it is so but for the arithmetic of cutting.
+fn to_edge(lon_deg: f64, hair_deg: f64) -> f64 {
+    if lon_deg.abs() > 180.0 - hair_deg {
+        180f64.copysign(lon_deg)
+    } else {
+        lon_deg
+    }
+}
+
+fn moved(ring: &LineString<f64>, by_deg: f64) -> LineString<f64> {
+    ring.map_coords(|c| Coord {
+        x: c.x + by_deg,
+        y: c.y,
+    })
 }
 
 /// Which half of the map a part lies on.
@@ -168,9 +239,11 @@ impl Side {
 
 #[cfg(test)]
 mod tests {
+    use super::super::geojson;
+    use super::super::layer::{Geometry, Kind, Layer};
     use super::*;
     use crate::frame::Planet;
-    use geo::{Area, Validation};
+    use geo::{Area, Validation, Winding};
 
     fn ring(radius_m: f64) -> MultiPolygon<f64> {
         let corner = |i: i32| {
@@ -236,17 +309,88 @@ mod tests {
 
     #[test]
     fn lines_are_cut_too() {
-        let site = Site::new(Planet::EARTH, Geodetic::from_degrees(0.0, 180.0, 0.0));
-        let cartographer = Cartographer {
-            site: &site,
-            up_m: &|_, _| 0.0,
-        };
         let places: Vec<Geodetic> = [179.5, -179.5, -179.0]
             .map(|lon| Geodetic::from_degrees(1.0, lon, 0.0))
             .to_vec();
-        let parts = cartographer.line(&places);
+        let parts = Cartographer::line(&places);
         assert_eq!(parts.len(), 2);
         assert_eq!(parts[0].last(), Some(&Coord { x: 180.0, y: 1.0 }));
         assert_eq!(parts[1][0], Coord { x: -180.0, y: 1.0 });
+    }
+
+    /// Pictures and discs, with holes, everywhere on the map where it is cut, and near by.
+    #[test]
+    fn every_polygon_is_simple_and_on_the_grid() {
+        let annulus = |radius_m: f64| {
+            let hole = ring(0.4 * radius_m).0[0].exterior().clone();
+            MultiPolygon::from(Polygon::new(
+                ring(radius_m).0[0].exterior().clone(),
+                vec![hole],
+            ))
+        };
+        let mut count = 0;
+        for lat in [0.0, -45.0, 89.0, 89.9991, 89.9996, -89.9999, 90.0, -90.0] {
+            for lon in [20.0, 179.9995, 180.0, -179.999, -90.0] {
+                for radius_m in [0.001, 0.0173, 1.0, 55.5, 100.0, 900.0] {
+                    let site = Site::new(Planet::EARTH, Geodetic::from_degrees(lat, lon, 0.0));
+                    let cartographer = Cartographer {
+                        site: &site,
+                        up_m: &|_, _| 0.0,
+                    };
+                    let drawn = cartographer.area(&annulus(radius_m));
+                    let at = format!("{lat} {lon} {radius_m}: {drawn:?}");
+                    assert!(!drawn.0.is_empty() && drawn.is_valid(), "{at}");
+                    for polygon in &drawn {
+                        for c in polygon.exterior().coords() {
+                            assert!(c.x.abs() <= 180.0 && c.y.abs() <= 90.0, "{at}");
+                            assert_eq!(*c, super::super::layer::on_grid(*c), "{at}");
+                        }
+                    }
+                    count += drawn.0.len();
+                }
+            }
+        }
+        assert!(count > 300, "{count}");
+    }
+
+    #[test]
+    fn the_cut_is_exact_far_from_the_origin() {
+        // 60 km west of the cut the ground lies 280 m below the tangent plane.
+        let site = Site::new(Planet::EARTH, Geodetic::from_degrees(10.0, 179.45, 0.0));
+        let edge = site.enu(Geodetic::from_degrees(10.0, 180.0, 0.0));
+        let cartographer = Cartographer {
+            site: &site,
+            up_m: &|_, _| edge.xyz.z,
+        };
+        let around = ring(100.0).map_coords(|c| Coord {
+            x: c.x + edge.xyz.x,
+            y: c.y + edge.xyz.y,
+        });
+        let drawn = cartographer.area(&around);
+        assert_eq!(drawn.0.len(), 2);
+        let whole = ring(100.0).unsigned_area();
+        assert!((area_m2(&drawn, 10.0) / whole - 1.0).abs() < 0.02);
+        for polygon in &drawn {
+            let on_cut = polygon.exterior().coords().filter(|c| c.x.abs() == 180.0);
+            assert!(on_cut.count() >= 2, "{polygon:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_written_winds_counter_clockwise() {
+        let layer = Layer::new(("ellipses", "", ""), Some(Kind::Polygon), Planet::EARTH);
+        for lon in [20.0, 180.0] {
+            let backwards = drawn(10.0, lon).map_coords(|c| Coord { x: c.x, y: -c.y });
+            let row = ("a".to_owned(), Some(Geometry::Polygons(backwards)), ());
+            let text = geojson::text(&layer.clone().filled(Vec::new(), [row]));
+            let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+            let geometry = &json["features"][0]["geometry"]["coordinates"];
+            let parts = if lon == 180.0 { &geometry[0] } else { geometry };
+            let number = |v: &serde_json::Value| v.as_f64().unwrap();
+            let exterior = parts[0].as_array().unwrap().iter();
+            let exterior: LineString<f64> =
+                exterior.map(|c| (number(&c[0]), number(&c[1]))).collect();
+            assert!(exterior.is_ccw());
+        }
     }
 }

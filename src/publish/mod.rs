@@ -18,6 +18,7 @@ pub mod picture;
 pub mod qgis;
 mod rock;
 mod scene;
+mod simple;
 pub mod stac;
 pub(crate) mod svg;
 mod wkt;
