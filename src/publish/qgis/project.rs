@@ -68,7 +68,13 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
     let planet = project.site.planet();
     let geographic = CrsText::of(planet.crs)?;
     let definition = local_crs(project.site);
-    let local = system(&CrsText::of(&definition)?, false);
+    let mut local = CrsText::of(&definition)?;
+    if local.code == 0 {
+        let name = format!("{}, about the site", geographic.name);
+        local.wkt2 = local.wkt2.replacen("unknown", &name, 1);
+        local.name = name;
+    }
+    let local = system(&local, false);
     let rank = |l: &&Layer| ORDER.iter().position(|name| *name == l.name);
     let mut layers: Vec<&Layer> = project
         .layers
@@ -146,7 +152,7 @@ fn local_crs(site: &Site) -> String {
         format!("+R={}", ellipsoid.a)
     };
     format!(
-        "+proj=aeqd +lat_0={lat:.6} +lon_0={lon:.6} +x_0=0 +y_0=0 {shape} +units=m +no_defs +type=crs"
+        "+proj=tmerc +lat_0={lat:.6} +lon_0={lon:.6} +k=1 +x_0=0 +y_0=0 {shape} +units=m +no_defs +type=crs"
     )
 }
 

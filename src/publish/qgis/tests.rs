@@ -108,10 +108,11 @@ fn other_planets_and_poles_are_shown_about_their_own_site() {
     for (planet, radius) in [(Planet::MOON, "1737400"), (Planet::EARTH, "298.257223563")] {
         let text = project(planet, pole, Format::GeoPackage);
         assert!(
-            text.contains("Azimuthal Equidistant") && text.contains(radius),
+            text.contains("Transverse Mercator") && text.contains(radius),
             "{planet:?}"
         );
     }
     let moon = project(Planet::MOON, pole, Format::GeoPackage);
+    assert!(moon.contains("Sphere / Ocentric, about the site"));
     assert!(moon.contains("<authid>IAU_2015:30100</authid>") && !moon.contains("WGS"));
 }
