@@ -143,7 +143,9 @@ def check_project(folder, counts, picture):
         close.setDestinationCrs(project.crs())
         close.setTransformContext(project.transformContext())
         box = close.layerExtentToOutputExtent(rocks, rocks.extent())
-        box.scale(0.35)
+        some = list(rocks.getFeatures())[rocks.featureCount() // 2].geometry()
+        centre = close.layerToMapCoordinates(rocks, some.asPoint())
+        box.scale(0.25, centre)
         draw(project, box, picture.with_name(picture.stem + "-close.png"))
 
 

@@ -41,18 +41,38 @@ const AMBER: Rgba = (217, 119, 6, 200);
 pub(super) fn rules(layer: &Layer) -> Vec<Rule> {
     match layer.name {
         "rocks" => rocks(layer),
-        "ellipses" => one(Symbol::area((190, 24, 93, 0), (190, 24, 93, 220), 0.2)),
-        "footprints" => one(Symbol::area((14, 165, 233, 9), (14, 116, 170, 60), 0.12)),
-        "views" => one(Symbol::sign(
-            "triangle",
-            INK,
-            2.4,
-            Some("coalesce(\"yaw_deg\", 0)"),
-        )),
+        "ellipses" => one(Symbol::area((190, 24, 93, 0), (190, 24, 93, 210), 0.15)),
+        "footprints" => one(footprint(layer.features.len())),
+        "views" => one(view(layer.features.len())),
         "traverse" => one(Symbol::way(INK, 0.5)),
         "detections" => one(Symbol::sign("circle", AMBER, 1.6, None)),
         _ => Vec::new(),
     }
+}
+
+/// How opaque a layer is as a whole: where many footprints lie, what is under them still shows.
+pub(super) fn opacity(layer: &Layer) -> f64 {
+    if layer.name == "footprints" { 0.5 } else { 1.0 }
+}
+
+/// The more there are, the fainter each.
+fn footprint(count: usize) -> Symbol {
+    let (fill, edge) = match count {
+        0..=30 => (24, 130),
+        31..=150 => (10, 70),
+        _ => (4, 30),
+    };
+    Symbol::area((14, 165, 233, fill), (14, 116, 170, edge), 0.12)
+}
+
+/// A triangle that points where the body heads; the more there are, the smaller.
+fn view(count: usize) -> Symbol {
+    let size_mm = match count {
+        0..=30 => 2.4,
+        31..=150 => 1.8,
+        _ => 1.2,
+    };
+    Symbol::sign("triangle", INK, size_mm, Some("coalesce(\"yaw_deg\", 0)"))
 }
 
 fn one(symbol: Symbol) -> Vec<Rule> {

@@ -8,7 +8,7 @@ mod xml;
 pub use project::{Project, qgz};
 
 use super::layer::{Kind, Layer};
-use legend::{Rule, rules};
+use legend::{Rule, opacity, rules};
 use xml::escaped;
 
 /// Labels appear at scales larger than one to this.
@@ -35,9 +35,10 @@ fn style(layer: &Layer) -> String {
     };
     format!(
         "{}{}<blendMode>0</blendMode>\n<featureBlendMode>0</featureBlendMode>\n\
-         <layerOpacity>1</layerOpacity>\n{}<layerGeometryType>{kind}</layerGeometryType>\n",
+         <layerOpacity>{}</layerOpacity>\n{}<layerGeometryType>{kind}</layerGeometryType>\n",
         renderer(&rules),
         labels(layer),
+        opacity(layer),
         meanings(layer)
     )
 }

@@ -155,7 +155,7 @@ fn sign(shape: &'static str, fill: Rgba, size_mm: f64, heading: Option<&'static 
         ("color", colour(fill)),
         ("outline_color", colour(WHITE)),
         ("outline_style", "solid".to_owned()),
-        ("outline_width", "0.2".to_owned()),
+        ("outline_width", "0.15".to_owned()),
         ("outline_width_unit", "MM".to_owned()),
         ("size", size_mm.to_string()),
         ("size_unit", "MM".to_owned()),
