@@ -118,9 +118,14 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
     for layer in &layers {
         text.push_str(&map_layer(project.format, layer, &geographic));
     }
+    text.push_str(&properties(&extent, &local));
+    Ok(text)
+}
+
+/// What stands at a project's end: relative paths, its background, and where it opens.
+fn properties(extent: &Rect<f64>, local: &str) -> String {
     let (min, max) = (extent.min(), extent.max());
-    let _ = write!(
-        text,
+    format!(
         "</projectlayers>\n<properties>\n<Paths>\n<Absolute type=\"bool\">false</Absolute>\n\
          </Paths>\n<Gui>\n<CanvasColorRedPart type=\"int\">247</CanvasColorRedPart>\n\
          <CanvasColorGreenPart type=\"int\">244</CanvasColorGreenPart>\n\
@@ -131,8 +136,7 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
          ymin=\"{:.3}\" xmax=\"{:.3}\" ymax=\"{:.3}\">\n{local}</DefaultViewExtent>\n\
          </ProjectViewSettings>\n</qgis>\n",
         min.x, min.y, max.x, max.y
-    );
-    Ok(text)
+    )
 }
 
 /// The system a map of the site is shown in, so that a circle is round: UTM on Earth, and where
