@@ -41,11 +41,11 @@ demo: deps ## Simulate a traverse, map it, and say which files to open
 	$(ROCKMAP) run pipelines/demo.toml --force
 	@echo
 	@echo 'Open'
-	@echo '  outputs/demo/rocks.geojson              the map: every rock once'
+	@echo '  outputs/demo/rockmap.qgz                the map in QGIS, styled'
+	@echo '  outputs/demo/rocks.geojson              every rock once, for any other GIS'
 	@echo '  outputs/demo/ellipses.geojson           where each rock lies with 95 % probability'
 	@echo '  outputs/demo/annotated/                 the map drawn back into every picture'
 	@echo '  outputs/demo-single/detections.geojson  before fusion: every detection by itself'
-	@echo 'in QGIS, or on any page that shows GeoJSON.'
 
 test: deps tools lint docs ## Run every check: format, lints, licences, documentation, tests
 	$(CARGO) test --release
@@ -67,7 +67,7 @@ docs: deps tools ## Build the book into docs/book and the library's reference
 	.ci/links
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --release --no-deps
 
-acceptance: demo ## Open the demo's layers with GDAL, and run the pipelines of real data where it is at hand
+acceptance: demo ## Open the demo's files with GDAL, GeoPandas and QGIS; run the real data that is at hand
 	@.ci/acceptance
 
 clean: ## Remove what was built and what runs have written

@@ -367,18 +367,16 @@ fn norths_heights_and_bodies_that_do_not_serve() {
 }
 
 #[test]
-fn methods_and_formats_that_are_not_there_yet() {
+fn methods_and_formats_that_are_not_there() {
     refused(
         &Case::new(),
         &[
-            "--method",
-            "belief",
             "--set",
-            "output.formats=[\"geojson\", \"gpkg\"]",
+            "output.formats=[\"geojson\", \"shapefile\", \"json\"]",
         ],
         &[
-            "error: --set: fusion.method: found \"belief\", expected em or paper: belief is not there yet",
-            "error: --set: output.formats: found \"gpkg\", expected geojson: gpkg is not there yet",
+            "error: --set: output.formats: found \"shapefile\", expected geojson, gpkg, flatgeobuf, geoparquet, csv",
+            "error: --set: output.formats: found \"json\" a second time, expected every format once",
         ],
     );
     refused(

@@ -8,10 +8,14 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use rockmap::frame::{Ellipsoid, Geodetic};
+use geo::{LineString, Polygon, Validation, Winding};
+use rockmap::frame::{Ellipsoid, Geodetic, Planet, Site};
 use rockmap::pipeline::{self, Config, Overrides, Silent, Summary};
 use serde_json::Value;
 use tempfile::TempDir;
+
+const ALL_FORMATS: &str =
+    "output.formats=[\"geojson\", \"gpkg\", \"flatgeobuf\", \"geoparquet\", \"csv\"]";
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -117,15 +121,158 @@ fn the_same_bytes_at_any_number_of_threads_and_in_two_runs() {
             Run::of(
                 "fixtures/tiny/pipeline.toml",
                 None,
-                &["output.detections=true"],
+                &["output.detections=true", ALL_FORMATS],
             )
             .bytes()
         })
     };
     let one = with(1);
-    assert!(one.len() > 12, "pictures too: {:?}", one.keys());
+    assert!(one.len() > 40, "pictures too: {:?}", one.keys());
     assert_eq!(one, with(2));
     assert_eq!(one, with(5));
+}
+
+#[test]
+fn the_manifest_lists_what_was_written() {
+    let run = Run::of(
+        "fixtures/tiny/pipeline.toml",
+        None,
+        &[
+            "output.formats=[\"fgb\", \"parquet\"]",
+            "output.annotate=false",
+        ],
+    );
+    let mut written: Vec<String> = run
+        .bytes()
+        .keys()
+        .map(|k| k.display().to_string())
+        .collect();
+    written.push("timing.json".to_owned());
+    written.sort();
+    let listed = run.json("run.json")["outputs"].clone();
+    assert_eq!(listed, Value::from(written.clone()));
+    assert!(written.contains(&"rocks.fgb".to_owned()));
+    assert!(written.contains(&"evidence.parquet".to_owned()));
+    assert!(!written.contains(&"rocks.geojson".to_owned()));
+    assert_eq!(
+        run.json("run.json")["config"]["output"]["formats"],
+        serde_json::json!(["flatgeobuf", "geoparquet"])
+    );
+}
+
+#[test]
+fn an_empty_night_gives_every_layer_with_its_columns_and_system() {
+    let nothing = ["view.min_score=1.0", "output.annotate=false", ALL_FORMATS];
+    for body in ["site.body=\"earth\"", "site.body=\"moon\""] {
+        let set = [&nothing[..], &[body]].concat();
+        let run = Run::of("fixtures/tiny/pipeline.toml", None, &set);
+        assert_eq!(run.summary.n_objects, Some(0));
+        let db = rusqlite::Connection::open(run.out().join("rockmap.gpkg")).unwrap();
+        let count = |sql: &str| db.query_row(sql, [], |row| row.get::<_, i64>(0)).unwrap();
+        assert_eq!(
+            count("SELECT count(rock_id || sigma_major_m || geom) FROM rocks"),
+            0
+        );
+        assert_eq!(count("SELECT count(*) FROM footprints"), 6);
+        let system = "SELECT srs_id FROM gpkg_contents WHERE table_name = 'rocks'";
+        assert_eq!(
+            count(system),
+            if body.contains("moon") { 30100 } else { 4326 }
+        );
+        for layer in ["rocks", "ellipses", "footprints", "views", "traverse"] {
+            for extension in ["geojson", "fgb", "parquet", "csv", "qml"] {
+                assert!(run.out().join(format!("{layer}.{extension}")).exists());
+            }
+        }
+        let header = fs::read_to_string(run.out().join("rocks.csv")).unwrap();
+        assert!(header.starts_with("lon_deg,lat_deg,rock_id,class,p_exist,"));
+        assert_eq!(header.lines().count(), 1);
+    }
+}
+
+/// Every polygon of a file as it is written, with its winding and holes.
+fn polygons(layer: &Value) -> Vec<Polygon<f64>> {
+    let ring = |ring: &Value| -> LineString<f64> {
+        let coords = ring.as_array().unwrap().iter();
+        coords
+            .map(|c| (c[0].as_f64().unwrap(), c[1].as_f64().unwrap()))
+            .collect()
+    };
+    let polygon = |rings: &Value| {
+        let rings = rings.as_array().unwrap();
+        Polygon::new(ring(&rings[0]), rings[1..].iter().map(ring).collect())
+    };
+    let features = layer["features"].as_array().unwrap().iter();
+    features
+        .map(|f| &f["geometry"])
+        .flat_map(|geometry| match geometry["type"].as_str() {
+            Some("Polygon") => vec![polygon(&geometry["coordinates"])],
+            Some("MultiPolygon") => {
+                let parts = geometry["coordinates"].as_array().unwrap();
+                parts.iter().map(polygon).collect()
+            }
+            _ => Vec::new(),
+        })
+        .collect()
+}
+
+/// The tiny traverse with its local frame put somewhere else on Earth.
+fn at_another_place(origin: &str) -> Run {
+    let data = tempfile::tempdir().unwrap();
+    let tiny = root().join("fixtures/tiny");
+    for file in ["cameras.toml", "detections.csv"] {
+        fs::copy(tiny.join(file), data.path().join(file)).unwrap();
+    }
+    let home = Site::new(
+        Planet::EARTH,
+        Geodetic::from_degrees(-24.45, -69.93, 1000.0),
+    );
+    let mut poses = "image_id,camera,time,x_m,y_m,z_m,qw,qx,qy,qz\n".to_owned();
+    for row in fs::read_to_string(tiny.join("poses.csv"))
+        .unwrap()
+        .lines()
+        .skip(1)
+    {
+        let cells: Vec<&str> = row.split(',').collect();
+        let number = |i: usize| cells[i].parse::<f64>().unwrap();
+        let at = home
+            .enu(Geodetic::from_degrees(number(4), number(5), number(6)))
+            .xyz;
+        let (image, attitude) = (cells[0], cells[7..].join(","));
+        poses += &format!(
+            "{image},mast,{},{},{},{},{attitude}\n",
+            cells[3], at.x, at.y, at.z
+        );
+    }
+    fs::write(data.path().join("poses.csv"), poses).unwrap();
+    let origin = format!("site.origin={origin}");
+    let set = [
+        origin.as_str(),
+        "terrain.plane_m=0.0",
+        "output.annotate=false",
+    ];
+    Run::of("fixtures/tiny/pipeline.toml", Some(data.path()), &set)
+}
+
+#[test]
+fn every_polygon_is_simple_and_counter_clockwise() {
+    for place in [
+        "{lat_deg=-24.45,lon_deg=-69.93,height_m=0.0}",
+        "{lat_deg=10.0,lon_deg=179.99996,height_m=0.0}",
+        "{lat_deg=-89.99996,lon_deg=0.0,height_m=0.0}",
+    ] {
+        let run = at_another_place(place);
+        let mut count = 0;
+        for name in ["ellipses.geojson", "footprints.geojson"] {
+            for polygon in polygons(&run.json(name)) {
+                assert!(polygon.is_valid(), "{place} {name}: {polygon:?}");
+                assert!(polygon.exterior().is_ccw(), "{place} {name}: {polygon:?}");
+                assert!(polygon.interiors().iter().all(LineString::is_cw));
+                count += 1;
+            }
+        }
+        assert!(count >= 15, "{place}: {count}");
+    }
 }
 
 #[test]

@@ -25,6 +25,7 @@
 mod axes;
 mod covariance;
 mod crs;
+mod crs_text;
 mod definition;
 mod geodetic;
 mod pixel;
@@ -42,6 +43,7 @@ mod vertical;
 pub use axes::{Body, Camera, Ecef, Enu, LocalEnu};
 pub use covariance::{Ellipse, covariance_ellipse};
 pub use crs::{Crs, CrsError};
+pub use crs_text::CrsText;
 pub use geodetic::{Ellipsoid, Geodetic};
 pub use pixel::Pixel;
 pub use planet::Planet;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::formats::formats;
 use super::paths::{Paths, Source};
 use crate::detection::Aim;
 use crate::error::{Error, Fault};
@@ -11,6 +12,7 @@ use crate::frame::{Crs, Geodetic, Planet, VerticalDatum};
 use crate::fuse::belief::{PoseCorrection, SizeRule};
 use crate::input::{Document, Section};
 use crate::pose::{HeadingReference, North, PoseSigma};
+use crate::publish::Format;
 
 /// A checked pipeline file.
 #[derive(Debug, Clone, Serialize)]
@@ -201,7 +203,7 @@ pub struct OutputConfig {
     #[serde(skip)]
     pub dir: PathBuf,
     /// Map formats.
-    pub formats: Vec<String>,
+    pub formats: Vec<Format>,
     /// Whether pictures are annotated.
     pub annotate: bool,
     /// Whether every detection is written by itself too.
@@ -546,30 +548,16 @@ fn output(section: Section<'_>, path: &Path, overrides: &Overrides) -> Option<Ou
     let stem = path.file_stem().unwrap_or_default();
     let written = section.text("dir").map(|dir| folder.join(dir));
     let dir = written.unwrap_or_else(|| folder.join("../outputs").join(stem));
-    let formats = section
-        .texts("formats")
-        .unwrap_or_else(|| vec!["geojson".to_owned()]);
-    let mut known = true;
-    for format in &formats {
-        let expected = match format.as_str() {
-            "geojson" => continue,
-            "gpkg" | "flatgeobuf" | "geoparquet" | "csv" => {
-                format!("geojson: {format} is not there yet")
-            }
-            _ => "geojson".to_owned(),
-        };
-        section.fault("formats", format!("{format:?}"), expected);
-        known = false;
-    }
+    let formats = formats(&section);
     let config = OutputConfig {
         min_exist: section
             .number("min_exist", 0.0..=1.0, "0 to 1")
             .unwrap_or(0.05),
         dir: overrides.out.clone().unwrap_or(dir),
-        formats,
+        formats: formats.clone().unwrap_or_default(),
         annotate: section.boolean("annotate").unwrap_or(true),
         detections: section.boolean("detections").unwrap_or(false),
     };
     section.finish();
-    known.then_some(config)
+    formats.map(|_| config)
 }

@@ -33,6 +33,7 @@ pub(super) fn run_json(
     fusion: Option<&Fusion>,
     run_id: &str,
     summary: &Summary,
+    outputs: &[String],
 ) -> String {
     let origin = inputs.site.origin();
     let (lat_deg, lon_deg) = inputs.site.planet().lat_lon_deg(origin);
@@ -62,6 +63,7 @@ pub(super) fn run_json(
             "objects": summary.n_objects,
             "pictures_annotated": summary.n_annotated,
         },
+        "outputs": outputs,
         "warnings": summary.warnings,
         "solver": fusion.map(solver),
     });

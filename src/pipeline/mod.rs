@@ -6,6 +6,7 @@ mod bound;
 mod checks;
 mod config;
 mod digest;
+mod formats;
 mod fuse;
 mod manifest;
 mod observer;

@@ -14,7 +14,9 @@ use super::summary::Summary;
 use crate::error::{Error, Fault, Place};
 use crate::fuse::Fusion;
 use crate::input::Reject;
-use crate::publish::{Folder, Picture, Product, Rock, Scene, annotate, reject_table};
+use crate::publish::{
+    Folder, Format, Layer, Picture, Product, Rock, Scene, annotate, qgis, reject_table, stac, table,
+};
 use crate::view::View;
 
 /// A folder that holds another run is replaced only where that is asked for.
@@ -49,6 +51,7 @@ pub(super) struct Map<'a> {
 /// What was written so far.
 #[derive(Default)]
 pub(super) struct Written {
+    files: Vec<String>,
     n_annotated: usize,
     warnings: Vec<String>,
 }
@@ -90,8 +93,10 @@ impl<'a> Map<'a> {
     pub(super) fn write(&self, folder: &Folder, observer: &dyn Observer) -> Result<Written, Error> {
         let pictures = self.pictures();
         observer.begin("publish", Some(pictures.len()));
+        let mut files = Vec::new();
         for product in self.products()? {
             folder.write(&product)?;
+            files.push(product.name);
         }
         let warnings = Mutex::new(Vec::new());
         let drawn: Vec<bool> = pictures
@@ -107,23 +112,74 @@ impl<'a> Map<'a> {
         let n_annotated = drawn.iter().filter(|d| **d).count();
         observer.end(&format!("{n_annotated} pictures annotated"));
         Ok(Written {
+            files,
             n_annotated,
             warnings,
         })
     }
 
     fn products(&self) -> Result<Vec<Product>, Error> {
+        let layers = self.layers();
+        let formats = &self.config.output.formats;
         let mut products = Vec::new();
-        if self.fusion.is_some() {
-            let site_name = &self.config.site.name;
-            products.extend(self.scene.map(&self.rocks, &self.run_id, site_name)?);
-        } else {
-            products.extend([self.scene.footprint_map(), self.scene.view_map()]);
+        for format in formats {
+            products.extend(format.write(&layers)?);
         }
-        if self.fusion.is_none() || self.config.output.detections {
-            products.push(self.scene.single_view_map(&self.rocks));
+        let evidence = layers.iter().filter(|l| l.geometry.is_none());
+        for layer in evidence {
+            products.push(table(layer)?);
         }
+        if formats.iter().any(|f| f.takes_styles()) {
+            let shown = layers.iter().filter(|l| l.geometry.is_some());
+            products.extend(shown.map(|l| Product::new(format!("{}.qml", l.name), qgis::qml(l))));
+        }
+        products.extend(self.project_file(&layers)?);
+        products.extend(self.catalogue_item(&layers, &products));
         Ok(products)
+    }
+
+    fn layers(&self) -> Vec<Layer> {
+        let mut layers = if self.fusion.is_some() {
+            let site_name = &self.config.site.name;
+            self.scene.map(&self.rocks, &self.run_id, site_name)
+        } else {
+            self.scene.unfused_map()
+        };
+        if self.fusion.is_none() || self.config.output.detections {
+            layers.push(self.scene.single_view_map(&self.rocks));
+        }
+        layers
+    }
+
+    /// A QGIS project over the files of the format that serves it best, if there is one.
+    fn project_file(&self, layers: &[Layer]) -> Result<Option<Product>, Error> {
+        let best = [Format::GeoPackage, Format::GeoJson, Format::FlatGeobuf];
+        let is_written = |format: &Format| self.config.output.formats.contains(format);
+        let Some(format) = best.into_iter().find(is_written) else {
+            return Ok(None);
+        };
+        let project = qgis::Project {
+            title: &self.config.site.name,
+            layers,
+            format,
+            site: self.scene.site,
+        };
+        Ok(Some(Product::new("rockmap.qgz", qgis::qgz(&project)?)))
+    }
+
+    fn catalogue_item(&self, layers: &[Layer], products: &[Product]) -> Option<Product> {
+        let files = products.iter().map(|p| p.name.as_str());
+        let item = stac::Item {
+            id: format!("{}-{}", self.config.site.name, self.run_id),
+            title: &self.config.site.name,
+            planet: self.scene.site.planet(),
+            layers,
+            assets: files
+                .chain(["rejects.csv", "run.json"])
+                .filter_map(stac::Asset::of)
+                .collect(),
+        };
+        Some(Product::new("stac.json", stac::text(&item)?))
     }
 
     /// The views whose pictures are drawn, each with its picture.
@@ -179,12 +235,16 @@ impl<'a> Map<'a> {
         summary.n_annotated = written.n_annotated;
         summary.warnings.extend(written.warnings);
         folder.write(&reject_table(&summary.rejects)?)?;
+        let mut outputs = written.files;
+        outputs.extend(["rejects.csv", "run.json", "timing.json"].map(str::to_owned));
+        outputs.sort();
         let manifest = run_json(
             self.config,
             self.inputs,
             self.fusion,
             &self.run_id,
             &summary,
+            &outputs,
         );
         folder.write(&Product::new("run.json", manifest))?;
         let timing = timing_json(&clock.stages, rayon::current_num_threads());

@@ -77,10 +77,10 @@ fn decimal_nanoseconds(text: &str) -> Option<i64> {
 }
 
 impl fmt::Display for Time {
-    /// RFC 3339 in UTC, with as many decimals as the instant has.
+    /// RFC 3339 in UTC, with as many decimals as the instant has, or as the format asks for.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match Timestamp::from_nanosecond(i128::from(self.nanoseconds)) {
-            Ok(stamp) => write!(f, "{stamp}"),
+            Ok(stamp) => fmt::Display::fmt(&stamp, f),
             Err(_) => write!(f, "{} ns", self.nanoseconds),
         }
     }

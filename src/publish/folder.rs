@@ -78,7 +78,7 @@ impl Folder {
     /// # Errors
     /// What the system says.
     pub fn write(&self, product: &Product) -> Result<(), Error> {
-        let path = self.path_of(Path::new(product.name))?;
+        let path = self.path_of(Path::new(&product.name))?;
         fs::write(&path, &product.content).map_err(|e| Error::io(&path, "write", e))
     }
 

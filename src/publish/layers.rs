@@ -1,205 +1,328 @@
-//! The layers of the map.
+//! The layers of the map, each described once.
 
 use geo::{Coord, MultiPolygon, Polygon};
-use serde_json::{Map, Value, json};
 
 use super::Scene;
-use super::geojson::{Geometry, Layer, lon_lat, number, optional};
 use super::ground::Cartographer;
-use super::rock::{Rock, objects_covered};
-use crate::frame::{Ellipse, Enu, Point, covariance_ellipse};
+use super::layer::{Column, Geometry, Kind, Layer, lon_lat, rounded};
+use super::rock::{Evidence, Rock, objects_covered};
+use crate::frame::{Ellipse, Enu, Geodetic, Point, covariance_ellipse};
 use crate::project::Placed;
 use crate::view::View;
 
 /// Corners of an ellipse.
 const CORNERS: u32 = 64;
 
-fn object(value: Value) -> Map<String, Value> {
-    match value {
-        Value::Object(map) => map,
-        _ => Map::new(),
-    }
-}
-
-/// A number of degrees, from radians.
-fn degrees(angle: f64) -> Value {
-    number(angle.to_degrees(), 4)
-}
-
-fn text(value: Option<impl ToString>) -> Value {
-    value.map_or(Value::Null, |v| Value::from(v.to_string()))
-}
+/// Columns by what a row is.
+type OfRock<'a> = Column<'a, &'a Rock>;
+type OfFootprint<'a> = Column<'a, usize>;
+type OfView<'a> = Column<'a, (&'a View, Geodetic)>;
+type OfWay<'a> = Column<'a, Way<'a>>;
+type OfDetection<'a> = Column<'a, (usize, &'a Placed, Geodetic, Ellipse)>;
+type OfMember<'a> = Column<'a, (&'a Rock, &'a Evidence, &'a Placed)>;
 
 impl Scene<'_> {
-    /// rocks.geojson.
+    /// Where the rocks are.
     pub(super) fn rocks(&self, rocks: &[Rock], run_id: &str) -> Layer {
-        let mut layer = Layer::new("rocks", self.site.planet());
-        for rock in rocks {
-            let best = rock.best_view.map(|v| &self.views[v].image_id);
-            let properties = json!({
-                "rock_id": rock.rock_id,
-                "class": rock.class,
-                "p_exist": optional(rock.object.p_exist, 4),
-                "n_views": rock.detected_by.len(),
-                "n_missed": rock.missed_by.len(),
-                "n_detections": rock.n_detections,
-                "sigma_major_m": number(rock.ellipse.sigma_major_m, 4),
-                "sigma_minor_m": number(rock.ellipse.sigma_minor_m, 4),
-                "sigma_az_deg": degrees(rock.ellipse.azimuth),
-                "diameter_m": optional(rock.diameter_m, 4),
-                "height_m": optional(self.height_m(rock.geodetic), 4),
-                "score": optional(rock.score, 4),
-                "best_image": best,
-                "first_seen": text(rock.seen.map(|s| s.0)),
-                "last_seen": text(rock.seen.map(|s| s.1)),
-                "run_id": run_id,
-            });
-            let point = Geometry::Point(lon_lat(rock.geodetic));
-            layer.add(rock.rock_id.clone(), point, object(properties));
-        }
-        layer
+        let columns: Vec<OfRock<'_>> = vec![
+            OfRock::text("rock_id", "name, within this run", |r| {
+                Some(r.rock_id.clone())
+            }),
+            OfRock::text("class", "class its detections carry", |r| r.class.clone()),
+            OfRock::real("p_exist", 4, "probability that it exists", |r| {
+                r.object.p_exist
+            }),
+            OfRock::count("n_views", "views that detected it", |r| r.detected_by.len()),
+            OfRock::count(
+                "n_missed",
+                "views that cover it and did not detect it",
+                |r| r.missed_by.len(),
+            ),
+            OfRock::count("n_detections", "detections that belong to it", |r| {
+                r.n_detections
+            }),
+            OfRock::real(
+                "sigma_major_m",
+                4,
+                "long half-axis of its 1-sigma ellipse, m",
+                |r| Some(r.ellipse.sigma_major_m),
+            ),
+            OfRock::real(
+                "sigma_minor_m",
+                4,
+                "short half-axis of its 1-sigma ellipse, m",
+                |r| Some(r.ellipse.sigma_minor_m),
+            ),
+            OfRock::real(
+                "sigma_az_deg",
+                4,
+                "azimuth of the long axis, degrees",
+                |r| Some(r.ellipse.azimuth.to_degrees()),
+            ),
+            OfRock::real("diameter_m", 4, "diameter, m", |r| r.diameter_m),
+            OfRock::real("height_m", 4, self.height_about(), |r| {
+                self.height_m(r.geodetic)
+            }),
+            OfRock::real("score", 4, "score of the detection that counts most", |r| {
+                r.score
+            }),
+            OfRock::text("best_image", "view in which it is largest", |r| {
+                r.best_view.map(|v| self.views[v].image_id.clone())
+            }),
+            OfRock::time("first_seen", "first view that detected it", |r| {
+                r.seen.map(|s| s.0)
+            }),
+            OfRock::time("last_seen", "last view that detected it", |r| {
+                r.seen.map(|s| s.1)
+            }),
+            OfRock::text("run_id", "the run", |_| Some(run_id.to_owned())),
+        ];
+        let about = ("rocks", "Rocks", "where the rocks are");
+        let rows = rocks.iter().map(|rock| {
+            let point = Geometry::Point(lon_lat(rock.geodetic, self.site.planet()));
+            (rock.rock_id.clone(), Some(point), rock)
+        });
+        self.layer(about, Kind::Point).filled(columns, rows)
     }
 
-    /// ellipses.geojson: where each rock is with 95 % probability.
+    /// Where each rock is with 95 % probability.
     pub(super) fn ellipses(&self, rocks: &[Rock]) -> Layer {
-        let mut layer = Layer::new("ellipses", self.site.planet());
-        for rock in rocks {
-            let properties = json!({
-                "rock_id": rock.rock_id,
-                "p_exist": optional(rock.object.p_exist, 4),
-                "confidence": 0.95,
-            });
+        let columns: Vec<OfRock<'_>> = vec![
+            OfRock::text("rock_id", "the rock", |r| Some(r.rock_id.clone())),
+            OfRock::real("p_exist", 4, "probability that it exists", |r| {
+                r.object.p_exist
+            }),
+            OfRock::real(
+                "confidence",
+                2,
+                "probability that the rock is inside",
+                |_| Some(0.95),
+            ),
+        ];
+        let about = (
+            "ellipses",
+            "95 % ellipses",
+            "where each rock is with 95 % probability",
+        );
+        let rows = rocks.iter().map(|rock| {
             let outline = self.ellipse(rock);
             let area = self.on_map(rock.object.place.xyz.z, &outline.into());
-            layer.add(
-                rock.rock_id.clone(),
-                Geometry::Polygons(area),
-                object(properties),
-            );
-        }
-        layer
+            (rock.rock_id.clone(), Some(Geometry::Polygons(area)), rock)
+        });
+        self.layer(about, Kind::Polygon).filled(columns, rows)
     }
 
-    /// footprints.geojson.
+    /// What each view could have seen.
     pub(super) fn footprint_layer(&self, rocks: &[Rock]) -> Layer {
-        let mut layer = Layer::new("footprints", self.site.planet());
         let covered = objects_covered(rocks);
         let mut detections = vec![0_usize; self.views.len()];
         for placed in self.placed {
             detections[placed.view] += 1;
         }
-        for (i, view) in self.views.iter().enumerate() {
-            let footprint = self.footprints.of(i);
-            let properties = json!({
-                "image_id": view.image_id,
-                "camera": view.camera_name(),
-                "time": text(view.time),
-                "area_m2": number(footprint.area_m2(), 3),
-                "n_detections": detections[i],
-                "n_objects": covered.get(&i).copied().unwrap_or(0),
-            });
-            let area = self.on_map(view.origin().xyz.z, footprint.ground());
-            layer.add(
-                view.image_id.clone(),
-                Geometry::Polygons(area),
-                object(properties),
-            );
-        }
-        layer
+        let columns: Vec<OfFootprint<'_>> = vec![
+            OfFootprint::text("image_id", "the view", |&i| {
+                Some(self.views[i].image_id.clone())
+            }),
+            OfFootprint::text("camera", "its camera", |&i| {
+                self.views[i].camera_name().map(str::to_owned)
+            }),
+            OfFootprint::time("time", "when it was taken", |&i| self.views[i].time),
+            OfFootprint::real("area_m2", 3, "area, m^2", |&i| {
+                Some(self.footprints.of(i).area_m2())
+            }),
+            OfFootprint::count("n_detections", "its detections on the ground", |&i| {
+                detections[i]
+            }),
+            OfFootprint::count("n_objects", "rocks it detected or covers", |i| {
+                covered.get(i).copied().unwrap_or(0)
+            }),
+        ];
+        let about = (
+            "footprints",
+            "Footprints",
+            "the ground that each view could have seen",
+        );
+        let rows = self.views.iter().enumerate().map(|(i, view)| {
+            let area = self.on_map(view.origin().xyz.z, self.footprints.of(i).ground());
+            (view.image_id.clone(), Some(Geometry::Polygons(area)), i)
+        });
+        self.layer(about, Kind::Polygon).filled(columns, rows)
     }
 
-    /// views.geojson: where every view was taken from.
+    /// Where every view was taken from.
     pub(super) fn view_layer(&self) -> Layer {
-        let mut layer = Layer::new("views", self.site.planet());
-        for view in self.views {
+        // Rounded first: what rounds up to a full turn is north.
+        let yaw_deg = |yaw: f64| rounded(yaw.to_degrees(), 4).rem_euclid(360.0);
+        let columns: Vec<OfView<'_>> = vec![
+            OfView::text("image_id", "the view", |(view, _)| {
+                Some(view.image_id.clone())
+            }),
+            OfView::text("camera", "its camera", |(view, _)| {
+                view.camera_name().map(str::to_owned)
+            }),
+            OfView::time("time", "when it was taken", |(view, _)| view.time),
+            OfView::real("height_m", 4, self.height_about(), |(_, place)| {
+                self.height_m(*place)
+            }),
+            OfView::real("yaw_deg", 4, "heading of the body, degrees", |(view, _)| {
+                view.yaw().map(yaw_deg)
+            }),
+            OfView::real("pose_shift_m", 4, "how far its pose was moved, m", |_| None),
+            OfView::real(
+                "pose_turn_deg",
+                4,
+                "how far its pose was turned, degrees",
+                |_| None,
+            ),
+        ];
+        let about = ("views", "Views", "where every view was taken from");
+        let rows = self.views.iter().map(|view| {
             let place = self.site.geodetic(view.origin());
-            // Rounded first: what rounds up to a full turn is north.
-            let rounded = |yaw: f64| (yaw.to_degrees() * 1e4).round() / 1e4;
-            let yaw_deg = view.yaw().map(|yaw| rounded(yaw).rem_euclid(360.0));
-            let properties = json!({
-                "image_id": view.image_id,
-                "camera": view.camera_name(),
-                "time": text(view.time),
-                "height_m": optional(self.height_m(place), 4),
-                "yaw_deg": optional(yaw_deg, 4),
-                "pose_shift_m": Value::Null,
-                "pose_turn_deg": Value::Null,
-            });
-            let point = Geometry::Point(lon_lat(place));
-            layer.add(view.image_id.clone(), point, object(properties));
-        }
-        layer
+            let point = Geometry::Point(lon_lat(place, self.site.planet()));
+            (view.image_id.clone(), Some(point), (view, place))
+        });
+        self.layer(about, Kind::Point).filled(columns, rows)
     }
 
-    /// traverse.geojson: the way of each platform, through its views in the order of acquisition.
+    /// The way of each platform, through its views in the order of acquisition.
     pub(super) fn traverses(&self, site_name: &str) -> Layer {
-        let mut layer = Layer::new("traverse", self.site.planet());
-        let mut platforms: Vec<Option<&str>> = Vec::new();
-        for view in self.views {
-            if !platforms.contains(&view.platform.as_deref()) {
-                platforms.push(view.platform.as_deref());
-            }
-        }
-        for platform in platforms {
-            let views: Vec<&View> = self
-                .views
-                .iter()
-                .filter(|v| v.platform.as_deref() == platform)
-                .collect();
-            let stops: Vec<Point<Enu>> = views
-                .iter()
-                .map(|v| v.pose.enu_from_body.origin())
-                .collect();
-            if stops.len() < 2 {
-                continue; // A line has at least two ends.
-            }
-            let length_m: f64 = stops.windows(2).map(|w| w[0].distance(w[1])).sum();
-            let id = platform.unwrap_or(site_name);
-            let properties = json!({
-                "traverse_id": id,
-                "length_m": number(length_m, 3),
-                "first_seen": text(views.iter().filter_map(|v| v.time).min()),
-                "last_seen": text(views.iter().filter_map(|v| v.time).max()),
-            });
-            let places: Vec<_> = stops.iter().map(|&p| self.site.geodetic(p)).collect();
-            let level = |_: f64, _: f64| 0.0;
-            let cartographer = Cartographer {
-                site: self.site,
-                up_m: &level,
-            };
-            let lines = Geometry::Lines(cartographer.line(&places));
-            layer.add(id.to_owned(), lines, object(properties));
-        }
-        layer
+        let columns: Vec<OfWay<'_>> = vec![
+            OfWay::text("traverse_id", "the platform", |way| Some(way.id.to_owned())),
+            OfWay::real("length_m", 3, "length, m", |way| {
+                Some(way.stops.windows(2).map(|w| w[0].distance(w[1])).sum())
+            }),
+            OfWay::time("first_seen", "first view", |way| {
+                way.views.iter().filter_map(|v| v.time).min()
+            }),
+            OfWay::time("last_seen", "last view", |way| {
+                way.views.iter().filter_map(|v| v.time).max()
+            }),
+        ];
+        let about = ("traverse", "Traverse", "the way of each platform");
+        let rows = self.ways(site_name).into_iter().map(|way| {
+            let places: Vec<_> = way.stops.iter().map(|&p| self.site.geodetic(p)).collect();
+            let lines = Cartographer::line(self.site.planet(), &places);
+            (way.id.to_owned(), Some(Geometry::Lines(lines)), way)
+        });
+        self.layer(about, Kind::Line).filled(columns, rows)
     }
 
-    /// detections.geojson: the single-view map. `rock_of` gives the rock a detection belongs to.
-    pub(super) fn detections(&self, rock_of: &dyn Fn(usize) -> Option<String>) -> Layer {
-        let mut layer = Layer::new("detections", self.site.planet());
-        for (i, placed) in self.placed.iter().enumerate() {
-            let place = self.site.geodetic(placed.hit.point);
-            let ellipse = self.ellipse_of(placed);
-            let detection = &placed.detection;
-            let properties = json!({
-                "image_id": detection.image_id,
-                "det_id": detection.det_id,
-                "class": detection.class,
-                "score": optional(detection.score, 4),
-                "range_m": number(placed.hit.slant_range_m, 4),
-                "sigma_major_m": number(ellipse.sigma_major_m, 4),
-                "sigma_minor_m": number(ellipse.sigma_minor_m, 4),
-                "sigma_az_deg": degrees(ellipse.azimuth),
-                "diameter_m": optional(placed.diameter_m, 4),
-                "height_m": optional(self.height_m(place), 4),
-                "rock_id": rock_of(i),
-            });
-            layer.add(
-                detection.key(),
-                Geometry::Point(lon_lat(place)),
-                object(properties),
-            );
+    /// The platforms with two or more views: a line has at least two ends.
+    fn ways<'a>(&'a self, site_name: &'a str) -> Vec<Way<'a>> {
+        let mut ways: Vec<Way<'a>> = Vec::new();
+        for view in self.views {
+            let platform = view.platform.as_deref();
+            let stop = view.pose.enu_from_body.origin();
+            match ways.iter_mut().find(|way| way.platform == platform) {
+                Some(way) => {
+                    way.views.push(view);
+                    way.stops.push(stop);
+                }
+                None => ways.push(Way {
+                    platform,
+                    id: platform.unwrap_or(site_name),
+                    views: vec![view],
+                    stops: vec![stop],
+                }),
+            }
         }
-        layer
+        ways.retain(|way| way.stops.len() > 1);
+        ways
+    }
+
+    /// The single-view map. `rock_of` gives the rock a detection belongs to.
+    pub(super) fn detections(&self, rock_of: &dyn Fn(usize) -> Option<String>) -> Layer {
+        let columns: Vec<OfDetection<'_>> = vec![
+            OfDetection::text("image_id", "the view", |(_, p, ..)| {
+                Some(p.detection.image_id.clone())
+            }),
+            OfDetection::text("det_id", "name, within the view", |(_, p, ..)| {
+                Some(p.detection.det_id.clone())
+            }),
+            OfDetection::text("class", "class", |(_, p, ..)| p.detection.class.clone()),
+            OfDetection::real("score", 4, "the detector's score", |(_, p, ..)| {
+                p.detection.score
+            }),
+            OfDetection::real(
+                "range_m",
+                4,
+                "slant distance from the camera, m",
+                |(_, p, ..)| Some(p.hit.slant_range_m),
+            ),
+            OfDetection::real(
+                "sigma_major_m",
+                4,
+                "long half-axis of its 1-sigma ellipse, m",
+                |r| Some(r.3.sigma_major_m),
+            ),
+            OfDetection::real(
+                "sigma_minor_m",
+                4,
+                "short half-axis of its 1-sigma ellipse, m",
+                |r| Some(r.3.sigma_minor_m),
+            ),
+            OfDetection::real(
+                "sigma_az_deg",
+                4,
+                "azimuth of the long axis, degrees",
+                |r| Some(r.3.azimuth.to_degrees()),
+            ),
+            OfDetection::real("diameter_m", 4, "diameter, m", |(_, p, ..)| p.diameter_m),
+            OfDetection::real("height_m", 4, self.height_about(), |r| self.height_m(r.2)),
+            OfDetection::text("rock_id", "the rock it belongs to", |(i, ..)| rock_of(*i)),
+        ];
+        let about = ("detections", "Detections", "every detection by itself");
+        let rows = self.placed.iter().enumerate().map(|(i, placed)| {
+            let place = self.site.geodetic(placed.hit.point);
+            let row = (i, placed, place, self.ellipse_of(placed));
+            let point = Geometry::Point(lon_lat(place, self.site.planet()));
+            (placed.detection.key(), Some(point), row)
+        });
+        self.layer(about, Kind::Point).filled(columns, rows)
+    }
+
+    /// What each rock rests on: every membership of at least 0.01.
+    pub(super) fn evidence(&self, rocks: &[Rock]) -> Layer {
+        let columns: Vec<OfMember<'_>> = vec![
+            OfMember::text("rock_id", "the rock", |(rock, ..)| {
+                Some(rock.rock_id.clone())
+            }),
+            OfMember::text("image_id", "the view", |(.., p)| {
+                Some(p.detection.image_id.clone())
+            }),
+            OfMember::text("det_id", "the detection", |(.., p)| {
+                Some(p.detection.det_id.clone())
+            }),
+            OfMember::real(
+                "weight",
+                6,
+                "probability that it is of the rock",
+                |(_, e, _)| Some(e.weight),
+            ),
+            OfMember::real(
+                "residual_px",
+                3,
+                "from mark to rock in the picture, px",
+                |(_, e, _)| e.residual_px,
+            ),
+            OfMember::real(
+                "residual_m",
+                4,
+                "from detection to rock on the ground, m",
+                |(_, e, _)| Some(e.residual_m),
+            ),
+        ];
+        let about = ("evidence", "Evidence", "the detections each rock rests on");
+        let members = rocks
+            .iter()
+            .flat_map(|rock| rock.evidence.iter().map(move |e| (rock, e)));
+        let rows =
+            members.map(|(rock, e)| (String::new(), None, (rock, e, &self.placed[e.placed])));
+        Layer::new(about, None, self.site.planet()).filled(columns, rows)
+    }
+
+    fn layer(&self, about: (&'static str, &'static str, &'static str), kind: Kind) -> Layer {
+        Layer::new(about, Some(kind), self.site.planet())
     }
 
     fn ellipse_of(&self, placed: &Placed) -> Ellipse {
@@ -244,4 +367,12 @@ impl Scene<'_> {
         };
         cartographer.area(area)
     }
+}
+
+/// A platform's views, with the places of its body.
+struct Way<'a> {
+    platform: Option<&'a str>,
+    id: &'a str,
+    views: Vec<&'a View>,
+    stops: Vec<Point<Enu>>,
 }

@@ -4,18 +4,29 @@
 
 pub mod annotate;
 mod annotated;
+mod csv_table;
+mod flatgeobuf;
 mod folder;
-pub mod geojson;
+mod format;
+mod geojson;
+mod geopackage;
+mod geoparquet;
 mod ground;
+pub mod layer;
 mod layers;
 pub mod picture;
+pub mod qgis;
 mod rock;
 mod scene;
+mod simple;
+pub mod stac;
 pub(crate) mod svg;
-mod tables;
+mod wkt;
 
 pub use annotate::{Annotation, annotate};
 pub use folder::Folder;
+pub use format::Format;
+pub use layer::Layer;
 pub use picture::Picture;
 pub use rock::{Evidence, Rock};
 pub use scene::Scene;
@@ -27,16 +38,16 @@ use crate::input::Reject;
 /// A file of the output folder.
 pub struct Product {
     /// Its name, relative to the folder.
-    pub name: &'static str,
+    pub name: String,
     /// Its content.
     pub content: Vec<u8>,
 }
 
 impl Product {
     /// A file of this name and content.
-    pub fn new(name: &'static str, content: impl Into<Vec<u8>>) -> Self {
+    pub fn new(name: impl Into<String>, content: impl Into<Vec<u8>>) -> Self {
         Self {
-            name,
+            name: name.into(),
             content: content.into(),
         }
     }
@@ -50,31 +61,29 @@ impl Scene<'_> {
 
     /// rocks.geojson alone.
     pub fn rocks_geojson(&self, rocks: &[Rock], run_id: &str) -> Product {
-        Product::new("rocks.geojson", self.rocks(rocks, run_id).to_text())
+        let layer = self.rocks(rocks, run_id);
+        Product::new("rocks.geojson", geojson::text(&layer))
     }
 
-    /// The map's layers and tables.
-    ///
-    /// # Errors
-    /// A table that cannot be written.
-    pub fn map(
-        &self,
-        rocks: &[Rock],
-        run_id: &str,
-        site_name: &str,
-    ) -> Result<Vec<Product>, Error> {
-        Ok(vec![
-            self.rocks_geojson(rocks, run_id),
-            Product::new("ellipses.geojson", self.ellipses(rocks).to_text()),
-            Product::new("footprints.geojson", self.footprint_layer(rocks).to_text()),
-            Product::new("views.geojson", self.view_layer().to_text()),
-            Product::new("traverse.geojson", self.traverses(site_name).to_text()),
-            Product::new("evidence.csv", self.evidence(rocks)?),
-        ])
+    /// The layers of the fused map, with its table of evidence.
+    pub fn map(&self, rocks: &[Rock], run_id: &str, site_name: &str) -> Vec<Layer> {
+        vec![
+            self.rocks(rocks, run_id),
+            self.ellipses(rocks),
+            self.footprint_layer(rocks),
+            self.view_layer(),
+            self.traverses(site_name),
+            self.evidence(rocks),
+        ]
+    }
+
+    /// The layers of a map in which nothing is fused, but for the detections.
+    pub fn unfused_map(&self) -> Vec<Layer> {
+        vec![self.footprint_layer(&[]), self.view_layer()]
     }
 
     /// The single-view map: every detection by itself, with the rock it belongs to if there are any.
-    pub fn single_view_map(&self, rocks: &[Rock]) -> Product {
+    pub fn single_view_map(&self, rocks: &[Rock]) -> Layer {
         let mut owner: Vec<Option<(f64, usize)>> = vec![None; self.placed.len()];
         for (r, rock) in rocks.iter().enumerate() {
             for &Member {
@@ -89,17 +98,7 @@ impl Scene<'_> {
             }
         }
         let rock_of = |i: usize| owner[i].map(|(_, r)| rocks[r].rock_id.clone());
-        Product::new("detections.geojson", self.detections(&rock_of).to_text())
-    }
-
-    /// footprints.geojson alone, where nothing is fused.
-    pub fn footprint_map(&self) -> Product {
-        Product::new("footprints.geojson", self.footprint_layer(&[]).to_text())
-    }
-
-    /// views.geojson alone, where nothing is fused.
-    pub fn view_map(&self) -> Product {
-        Product::new("views.geojson", self.view_layer().to_text())
+        self.detections(&rock_of)
     }
 
     /// What is drawn into the picture of a view.
@@ -108,10 +107,19 @@ impl Scene<'_> {
     }
 }
 
+/// A layer as a CSV file of its name.
+///
+/// # Errors
+/// A table that cannot be written.
+pub fn table(layer: &Layer) -> Result<Product, Error> {
+    let name = Format::Csv.file_of(layer.name);
+    Ok(Product::new(name, csv_table::bytes(layer)?))
+}
+
 /// rejects.csv, in the order of files and lines.
 ///
 /// # Errors
 /// A table that cannot be written.
 pub fn reject_table(rejects: &[Reject]) -> Result<Product, Error> {
-    Ok(Product::new("rejects.csv", tables::rejects(rejects)?))
+    Ok(Product::new("rejects.csv", csv_table::rejects(rejects)?))
 }

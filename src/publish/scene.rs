@@ -40,4 +40,12 @@ impl Scene<'_> {
             Some(datum) => datum.height_m(place).ok(),
         }
     }
+
+    /// What the heights of the map are, for the description of a field.
+    pub(super) fn height_about(&self) -> &'static str {
+        match self.datum {
+            None => "height above the ellipsoid, m",
+            Some(_) => "height in the run's vertical datum, m",
+        }
+    }
 }

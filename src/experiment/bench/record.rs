@@ -225,6 +225,6 @@ impl Run {
         let seconds = fusing.map_or(0.0, |s| s.seconds);
         let scene = ground.scene(&config, &self.inputs);
         let map = scene.rocks_geojson(&scene.rock_map(&fusion), "");
-        Ok((map_from_bytes(&map.content, map.name)?, seconds))
+        Ok((map_from_bytes(&map.content, &map.name)?, seconds))
     }
 }

@@ -1,0 +1,177 @@
+"""Opens every file of an output folder in QGIS, without a screen, and draws the project.
+
+    in_qgis.py OUTPUTS PICTURE.png
+
+Checks that each layer file and each layer of the GeoPackage loads with the features, the geometry
+type and the coordinate reference system that run.json's site and the GeoJSON layers have, that the
+styles are applied by themselves, and that the project finds its files in another folder.
+"""
+
+import json
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.mkdtemp())
+
+from qgis.core import (  # noqa: E402
+    QgsApplication,
+    QgsMapRendererParallelJob,
+    QgsMapSettings,
+    QgsProject,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
+from qgis.PyQt.QtCore import QSize  # noqa: E402
+
+GEOMETRY = {
+    "rocks": QgsWkbTypes.PointGeometry,
+    "views": QgsWkbTypes.PointGeometry,
+    "detections": QgsWkbTypes.PointGeometry,
+    "traverse": QgsWkbTypes.LineGeometry,
+    "ellipses": QgsWkbTypes.PolygonGeometry,
+    "footprints": QgsWkbTypes.PolygonGeometry,
+}
+RADIUS = {"earth": 6378137.0, "moon": 1737400.0, "mars": 3396190.0}
+
+
+class Fault(Exception):
+    """What is not as it should be."""
+
+
+def expect(what, found, expected):
+    if found != expected:
+        raise Fault(f"{what}: found {found!r}, expected {expected!r}")
+
+
+def check_layer(shown, layer, name, count, body):
+    expect(f"{shown}: is valid", layer.isValid(), True)
+    expect(f"{shown}: features", layer.featureCount(), count)
+    if count or "gpkg" in shown:
+        expect(f"{shown}: geometry", layer.geometryType(), GEOMETRY[name])
+    crs = layer.crs()
+    if shown.endswith(".geojson") and body != "earth" and not crs.isValid():
+        return  # An older QGIS does not know the system by its name, and claims none.
+    expect(f"{shown}: geographic", crs.isGeographic(), True)
+    wkt = crs.toWkt()
+    if str(int(RADIUS[body])) not in wkt:
+        raise Fault(f"{shown}: found {wkt}, expected the system of the {body}")
+    if body == "earth":
+        expect(f"{shown}: crs", crs.authid(), "EPSG:4326")
+
+
+def check_style(shown, layer, qml):
+    """The renderer is the one of the style beside the file, not a default of QGIS."""
+    styled = QgsVectorLayer(layer.source(), "styled", "ogr")
+    _, ok = styled.loadNamedStyle(str(qml))
+    expect(f"{shown}: style is readable", ok, True)
+    expect(f"{shown}: renderer", layer.renderer().type(), styled.renderer().type())
+    expect(f"{shown}: legend", legend(layer), legend(styled))
+    expect(f"{shown}: labels", layer.labelsEnabled(), layer.name() == "rocks")
+
+
+def legend(layer):
+    items = layer.renderer().legendSymbolItems()
+    return [(item.label(), item.symbol().color().name(), item.symbol().dump()) for item in items]
+
+
+def check_files(folder, body, counts):
+    for path in sorted(folder.iterdir()):
+        if path.suffix not in (".geojson", ".fgb"):
+            continue
+        name = path.stem
+        layer = QgsVectorLayer(str(path), name, "ogr")
+        if path.suffix == ".geojson" and counts[name] == 0:
+            # GeoJSON without features has no columns, and QGIS takes it for a table.
+            expect(f"{path.name}: is valid", layer.isValid(), True)
+            continue
+        check_layer(path.name, layer, name, counts[name], body)
+        check_style(path.name, layer, path.with_suffix(".qml"))
+        print(f"{path.name:32} {layer.featureCount():6}  {layer.renderer().type()}")
+    for name, count in counts.items():
+        source = f"{folder / 'rockmap.gpkg'}|layername={name}"
+        layer = QgsVectorLayer(source, name, "ogr")
+        check_layer(f"rockmap.gpkg {name}", layer, name, count, body)
+        check_style(f"rockmap.gpkg {name}", layer, folder / f"{name}.qml")
+        print(f"{'rockmap.gpkg ' + name:32} {layer.featureCount():6}  {layer.renderer().type()}")
+
+
+def draw(project, extent, picture, pixels=(1600, 1100)):
+    settings = QgsMapSettings()
+    settings.setLayers(project.layerTreeRoot().checkedLayers())
+    settings.setDestinationCrs(project.crs())
+    settings.setTransformContext(project.transformContext())
+    settings.setBackgroundColor(project.backgroundColor())
+    settings.setOutputSize(QSize(*pixels))
+    settings.setOutputDpi(144)
+    settings.setExtent(extent)
+    job = QgsMapRendererParallelJob(settings)
+    job.start()
+    job.waitForFinished()
+    expect("errors in drawing", [e.message for e in job.errors()], [])
+    image = job.renderedImage()
+    colours = {
+        image.pixel(x, y)
+        for x in range(0, image.width(), 7)
+        for y in range(0, image.height(), 7)
+    }
+    if len(colours) < 5:
+        raise Fault(f"{picture}: found {len(colours)} colours, expected a map")
+    image.save(str(picture))
+    print(f"drawn to {picture}")
+
+
+def check_project(folder, counts, picture):
+    project = QgsProject.instance()
+    expect("rockmap.qgz: opens", project.read(str(folder / "rockmap.qgz")), True)
+    expect("rockmap.qgz: crs is valid", project.crs().isValid(), True)
+    expect("rockmap.qgz: metres", project.crs().isGeographic(), False)
+    layers = {layer.id().replace("rockmap_", ""): layer for layer in project.mapLayers().values()}
+    expect("rockmap.qgz: layers", sorted(layers), sorted(counts))
+    for name, layer in layers.items():
+        expect(f"rockmap.qgz: {name} is valid", layer.isValid(), True)
+        expect(f"rockmap.qgz: {name} features", layer.featureCount(), counts[name])
+        expect(f"rockmap.qgz: {name} moved along", str(folder) in layer.source(), True)
+    extent = project.viewSettings().defaultViewExtent()
+    draw(project, extent, picture)
+    rocks = layers.get("rocks")
+    if rocks is not None and rocks.featureCount():
+        close = QgsMapSettings()
+        close.setDestinationCrs(project.crs())
+        close.setTransformContext(project.transformContext())
+        box = close.layerExtentToOutputExtent(rocks, rocks.extent())
+        some = list(rocks.getFeatures())[rocks.featureCount() // 2].geometry()
+        centre = close.layerToMapCoordinates(rocks, some.asPoint())
+        box.scale(0.25, centre)
+        draw(project, box, picture.with_name(picture.stem + "-close.png"))
+
+
+def main(outputs, picture):
+    QgsApplication.setPrefixPath("/usr", True)
+    application = QgsApplication([], False)
+    application.initQgis()
+    try:
+        # Everything is opened where nothing was made: paths must be relative.
+        with tempfile.TemporaryDirectory() as elsewhere:
+            folder = Path(elsewhere) / "moved"
+            shutil.copytree(outputs, folder, ignore=shutil.ignore_patterns("annotated"))
+            body = json.loads((folder / "run.json").read_text())["site"]["body"]
+            counts = {
+                path.stem: len(json.loads(path.read_text())["features"])
+                for path in sorted(folder.glob("*.geojson"))
+            }
+            check_files(folder, body, counts)
+            check_project(folder, counts, picture)
+            QgsProject.instance().clear()
+    except Fault as fault:
+        print(fault, file=sys.stderr, flush=True)
+        # QGIS does not survive its own end while layers are alive.
+        os._exit(1)
+    application.exitQgis()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
