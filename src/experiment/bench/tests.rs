@@ -123,7 +123,7 @@ fn options_are_told_what_is_wrong_with_them() {
     assert_eq!(Contender::parse_list("em, paper").unwrap(), both);
     assert_eq!(
         Contender::parse_list("em,papr").unwrap_err().to_string(),
-        "--methods: found \"papr\", expected a list of em, paper, clairvoyant, fair (is paper meant?)"
+        "--methods: found \"papr\", expected a list of em, paper, belief, clairvoyant, fair (is paper meant?)"
     );
     assert_eq!(
         Contender::parse_list("em,em").unwrap_err().to_string(),
