@@ -92,7 +92,7 @@ impl Engine<'_> {
                 }
                 let y = &self.objects[b];
                 let d = [x[0] - y[0], x[1] - y[1]];
-                if d[0].hypot(d[1]) > reach_m {
+                if d[0] * d[0] + d[1] * d[1] > reach_m * reach_m {
                     continue;
                 }
                 let c = |i: usize, j: usize| cov[a][i][j] + cov[b][i][j];

@@ -6,6 +6,7 @@ mod engine;
 mod evidence;
 mod expect;
 mod footprint;
+mod ground;
 mod learn;
 mod looks;
 mod merge;

@@ -145,8 +145,8 @@ impl Engine<'_> {
         let reach_m = self.search_m();
         for k in among.near.about(origin.x, origin.y, reach_m) {
             let x = &among.objects[k];
-            let away = (x[0] - origin.x).hypot(x[1] - origin.y);
-            if away > reach_m {
+            let away2 = (x[0] - origin.x).powi(2) + (x[1] - origin.y).powi(2);
+            if away2 > reach_m * reach_m {
                 continue;
             }
             if let Some(mut pair) = self.pair(view, k, x, &among.cov[k], pose_cov) {
