@@ -101,7 +101,11 @@ pub fn fuse_belief(problem: &Problem<'_>, settings: &BeliefSettings) -> Belief {
     let order: Vec<usize> = (0..fresh.n_views()).collect();
     let mut engine = fresh.clone();
     engine.sequence(&order);
+    let at_first = engine.partners();
     let (mut evidence, mut rounds, mut converged) = engine.refine();
+    let at_last = engine.partners();
+    let doubt = at_first.iter().zip(&at_last).filter(|(a, b)| a != b).count() as f64 / at_first.len().max(1) as f64;
+    if std::env::var("DEBUGJ").is_ok() { eprintln!("doubt {doubt:.3} q {:.3} psc {:?}", engine.model.scales[0], engine.model.pose_scale.map(|x| (x*100.0).round()/100.0)); }
     let mut best = engine.objective(&evidence);
     let debug = std::env::var("DEBUGJ").is_ok();
     if debug { eprintln!("J first {best:.1}"); }
@@ -130,6 +134,22 @@ pub fn fuse_belief(problem: &Problem<'_>, settings: &BeliefSettings) -> Belief {
 }
 
 impl Engine<'_> {
+    /// Of every look the look before it of the same object.
+    fn partners(&self) -> Vec<Option<usize>> {
+        let owners = self.owners();
+        let mut last = vec![None; self.objects.len()];
+        owners
+            .iter()
+            .enumerate()
+            .map(|(look, owner)| {
+                let before = &mut last[(*owner)?];
+                let found = *before;
+                *before = Some(look);
+                found
+            })
+            .collect()
+    }
+
     /// Stage B: rounds of association, adjustment and learning.
     fn refine(&mut self) -> (Evidence, usize, bool) {
         for c2 in SCHEDULE {
