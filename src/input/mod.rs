@@ -11,6 +11,7 @@ mod table;
 
 pub use document::Document;
 pub use reject::{Reason, Reject};
+pub(crate) use rows::rows_text;
 pub use rows::write_rows;
 pub use section::Section;
 pub use table::{Row, Table};

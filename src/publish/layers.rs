@@ -111,7 +111,8 @@ impl Scene<'_> {
     /// views.geojson: where every view was taken from.
     pub(super) fn view_layer(&self) -> Layer {
         let mut layer = Layer::new("views", self.site.planet());
-        for view in self.views {
+        for (index, view) in self.views.iter().enumerate() {
+            let correction = self.correction(index);
             let place = self.site.geodetic(view.origin());
             // Rounded first: what rounds up to a full turn is north.
             let rounded = |yaw: f64| (yaw.to_degrees() * 1e4).round() / 1e4;
@@ -122,8 +123,8 @@ impl Scene<'_> {
                 "time": text(view.time),
                 "height_m": number(place.height_m, 4),
                 "yaw_deg": optional(yaw_deg, 4),
-                "pose_shift_m": Value::Null,
-                "pose_turn_deg": Value::Null,
+                "pose_shift_m": optional(correction.map(|c| c.shift_m), 4),
+                "pose_turn_deg": optional(correction.map(|c| c.turn.to_degrees()), 4),
             });
             let point = Geometry::Point(lon_lat(place));
             layer.add(view.image_id.clone(), point, object(properties));

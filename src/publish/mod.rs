@@ -4,6 +4,7 @@
 
 pub mod annotate;
 mod annotated;
+mod corrected;
 mod folder;
 pub mod geojson;
 mod ground;
@@ -63,14 +64,18 @@ impl Scene<'_> {
         run_id: &str,
         site_name: &str,
     ) -> Result<Vec<Product>, Error> {
-        Ok(vec![
+        let corrected = self.corrected_poses().transpose()?;
+        let corrected = corrected.map(|poses| Product::new("poses_corrected.csv", poses));
+        let mut products = vec![
             self.rocks_geojson(rocks, run_id),
             Product::new("ellipses.geojson", self.ellipses(rocks).to_text()),
             Product::new("footprints.geojson", self.footprint_layer(rocks).to_text()),
             Product::new("views.geojson", self.view_layer().to_text()),
             Product::new("traverse.geojson", self.traverses(site_name).to_text()),
             Product::new("evidence.csv", self.evidence(rocks)?),
-        ])
+        ];
+        products.extend(corrected);
+        Ok(products)
     }
 
     /// The single-view map: every detection by itself, with the rock it belongs to if there are any.

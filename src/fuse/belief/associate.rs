@@ -20,6 +20,8 @@ const OTHERS: f64 = 0.5;
 const LEAST_MEMBERSHIP: f64 = 0.01;
 /// Objects with less support are dropped.
 const LEAST_SUPPORT: f64 = 0.3;
+/// Looks less apart than this repeat each other.
+const REPEATS: f64 = 0.5;
 /// Memberships of which a detection may be the origin of its object.
 const ORIGIN: f64 = 0.05;
 
@@ -141,7 +143,7 @@ impl Engine<'_> {
         let x = &self.objects[object];
         neighbours
             .into_iter()
-            .any(|&v| self.apart(x, v, view, Repeats::Errors) < super::learn::knob(3, 0.5))
+            .any(|&v| self.apart(x, v, view, Repeats::Errors) < REPEATS)
     }
 
     /// The weight that each candidate had in the last round.

@@ -381,10 +381,6 @@ impl<'a> Engine<'a> {
             self.pose_cov[view] = self.pose_prior(view);
         }
     }
-
-    pub(super) fn pose_cov_of(information: &Square6) -> Option<Square6> {
-        Some(inverse6(information)?.0)
-    }
 }
 
 /// What is believed of an object before any look.

@@ -205,7 +205,7 @@ impl Engine<'_> {
         #[expect(clippy::cast_precision_loss, reason = "a count of views")]
         let n_views = self.n_views() as f64 + 1.0;
         self.model.clutter = clutter / n_views;
-        self.model.transients = transients / n_views / self.view_area_m2 * knob(0, 1.0);
+        self.model.transients = transients / n_views / self.view_area_m2;
         let mut missed = vec![0.0; self.objects.len()];
         for (pair, worth) in evidence.expectation.pairs.iter().zip(&evidence.worth) {
             missed[pair.object] += worth * (-pair.p_detect).ln_1p();

@@ -52,8 +52,6 @@ pub(super) struct Candidate {
     /// Index of its pair.
     pub(super) pair: usize,
     pub(super) ln_likelihood: f64,
-    /// Squared Mahalanobis distance under the narrow noise.
-    pub(super) narrow2: f64,
 }
 
 /// A candidate with its residual, its derivatives and its noise.
@@ -254,13 +252,12 @@ impl Engine<'_> {
         }
         let spread = struck(&pair.spread, &detection.has);
         let rows = (detection.n, detection.n_rows());
-        let (ln_likelihood, m2, narrow2) = log_likelihood(&e, &spread, &loose, rows)?;
+        let (ln_likelihood, m2) = log_likelihood(&e, &spread, &loose, rows)?;
         (m2 < GATE).then_some(CandidateInFull {
             candidate: Candidate {
                 look,
                 pair: index,
                 ln_likelihood,
-                narrow2,
             },
             e,
             variances: loose,

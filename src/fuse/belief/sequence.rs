@@ -63,10 +63,9 @@ impl Engine<'_> {
                 self.take_in(view, &mut map, &mut exclusive);
             }
             self.found_new(view, &mut map);
-            let w = super::learn::knob(6, 24.0) as usize;
-            let window = &order[(at + 1).saturating_sub(w)..=at];
-            if at >= w {
-                self.fold(order[at - w], &mut map);
+            let window = &order[(at + 1).saturating_sub(WINDOW)..=at];
+            if at >= WINDOW {
+                self.fold(order[at - WINDOW], &mut map);
             }
             self.settle_window(view, window, &mut map);
         }
@@ -121,7 +120,7 @@ impl Engine<'_> {
         let mut joining: Vec<usize> = (0..p.len())
             .filter(|&i| {
                 let look = found.candidates[i].candidate.look;
-                total[look - first] > JOINS && p[i] > super::learn::knob(5, LEAST_MEMBERSHIP)
+                total[look - first] > JOINS && p[i] > LEAST_MEMBERSHIP
             })
             .collect();
         joining.sort_by(|&a, &b| p[b].total_cmp(&p[a]).then(a.cmp(&b)));
@@ -269,5 +268,5 @@ impl Engine<'_> {
 /// Registration never takes an object for certain, one way or the other: its own beginnings are
 /// rough.
 fn likely(log_odds: f64) -> f64 {
-    probability(log_odds).clamp(super::learn::knob(7, 0.1), super::learn::knob(8,0.9))
+    probability(log_odds).clamp(0.1, 0.9)
 }
