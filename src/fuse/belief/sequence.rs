@@ -32,6 +32,8 @@ struct Growing {
     /// Log-odds that they exist, and the probabilities as registration takes them.
     log_odds: Vec<f64>,
     exist: Vec<f64>,
+    /// The last view that expected each to be seen.
+    last: Vec<Option<usize>>,
     near: Buckets,
     /// The object of each look.
     own: Vec<Option<usize>>,
@@ -40,6 +42,14 @@ struct Growing {
     /// Information of looks that have left the window, and its product with the place.
     folded: Vec<Square4>,
     toward: Vec<[f64; 4]>,
+}
+
+impl Growing {
+    /// How much of a view's look at an object is new: little soon after the last.
+    fn news(&self, engine: &Engine<'_>, object: usize, view: usize) -> f64 {
+        let x = &self.objects[object];
+        self.last[object].map_or(1.0, |last| engine.apart(x, last, view, Repeats::Detection))
+    }
 }
 
 impl Engine<'_> {
@@ -51,6 +61,7 @@ impl Engine<'_> {
             classes: Vec::new(),
             log_odds: Vec::new(),
             exist: Vec::new(),
+            last: Vec::new(),
             near: Buckets::new(self.bucket_m()),
             own: vec![None; self.looks.len()],
             worth: vec![1.0; self.looks.len()],
@@ -132,16 +143,18 @@ impl Engine<'_> {
                 taken.push(object);
                 map.own[c.look] = Some(object);
                 let clutter = self.background[c.look].clutter;
-                map.log_odds[object] += c.ln_likelihood - clutter
-                    + found.pairs[c.pair].pair.p_detect.max(0.02).ln();
+                map.log_odds[object] += map.news(self, object, view)
+                    * (c.ln_likelihood - clutter
+                        + found.pairs[c.pair].pair.p_detect.max(0.02).ln());
             }
         }
         for pair in &found.pairs {
             let k = pair.pair.object;
             if !taken.contains(&k) {
-                map.log_odds[k] += (-pair.pair.p_detect).ln_1p();
+                map.log_odds[k] += map.news(self, k, view) * (-pair.pair.p_detect).ln_1p();
             }
             map.exist[k] = likely(map.log_odds[k]);
+            map.last[k] = Some(view);
         }
     }
 
@@ -161,6 +174,7 @@ impl Engine<'_> {
             let background = &self.background[look];
             map.log_odds.push(background.new - background.clutter);
             map.exist.push(likely(background.new - background.clutter));
+            map.last.push(Some(view));
             map.folded.push([[0.0; 4]; 4]);
             map.toward.push([0.0; 4]);
         }
