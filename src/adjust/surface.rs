@@ -12,6 +12,12 @@ pub trait Surface: Sync {
     /// The ground on the vertical line at an east and a north, metres; `None` where it is unknown.
     fn ground_at(&self, east_m: f64, north_m: f64) -> Option<Ground>;
 
+    /// Whether it bends no more than a planet does: then heights between places some metres apart
+    /// may be interpolated, to micrometres.
+    fn is_smooth(&self) -> bool {
+        false
+    }
+
     /// Where a ray first meets the ground within a ground range; `None` where it does not.
     fn first_hit(&self, ray: Ray<Enu>, max_ground_range_m: f64) -> Option<Point<Enu>>;
 
@@ -33,6 +39,10 @@ pub trait Surface: Sync {
 impl Surface for Terrain {
     fn ground_at(&self, east_m: f64, north_m: f64) -> Option<Ground> {
         Terrain::ground_at(self, east_m, north_m)
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.is_constant_height()
     }
 
     fn first_hit(&self, ray: Ray<Enu>, max_ground_range_m: f64) -> Option<Point<Enu>> {

@@ -95,7 +95,8 @@ impl Ellipsoid {
     /// under 1e-9 m from the centre's third part to ten thousand kilometres up.
     pub fn to_geodetic(&self, ecef: Point<Ecef>) -> Geodetic {
         let (x, y, z) = (ecef.xyz.x, ecef.xyz.y, ecef.xyz.z);
-        let p = x.hypot(y);
+        // Lengths of a planet's size neither overflow nor vanish: no need for a careful hypotenuse.
+        let p = (x * x + y * y).sqrt();
         let e2 = self.e2();
         let b = self.a * (1.0 - self.f);
         let ep2 = e2 / (1.0 - e2);
@@ -116,7 +117,7 @@ impl Ellipsoid {
 
 /// `(s, c)` scaled to length one; (0, 1) where both vanish.
 fn unit(s: f64, c: f64) -> (f64, f64) {
-    let norm = s.hypot(c);
+    let norm = (s * s + c * c).sqrt();
     if norm > 0.0 {
         (s / norm, c / norm)
     } else {

@@ -19,6 +19,7 @@ mod yaml;
 pub use document::Document;
 pub(crate) use head::{first_character, image_id_of, text};
 pub use reject::{Reason, Reject};
+pub(crate) use rows::rows_text;
 pub use rows::write_rows;
 pub use section::Section;
 pub use table::{Row, Table};

@@ -10,7 +10,15 @@ use crate::error::Error;
 /// # Errors
 /// A file that cannot be written.
 pub fn write_rows(path: &Path, columns: &[(&str, Vec<String>)]) -> Result<(), Error> {
-    let failed = |e: csv::Error| Error::io(path, "write", std::io::Error::other(e));
+    std::fs::write(path, rows_text(columns)?).map_err(|e| Error::io(path, "write", e))
+}
+
+/// The same in memory.
+///
+/// # Errors
+/// None that memory could cause.
+pub fn rows_text(columns: &[(&str, Vec<String>)]) -> Result<Vec<u8>, Error> {
+    let failed = |e: csv::Error| Error::Output(format!("cannot write a table: {e}"));
     let mut bytes = Vec::new();
     {
         let mut writer = csv::Writer::from_writer(&mut bytes);
@@ -21,7 +29,7 @@ pub fn write_rows(path: &Path, columns: &[(&str, Vec<String>)]) -> Result<(), Er
             let record = columns.iter().map(|(_, values)| values[row].as_str());
             writer.write_record(record).map_err(failed)?;
         }
-        writer.flush().map_err(|e| Error::io(path, "write", e))?;
+        writer.flush().map_err(|e| failed(e.into()))?;
     }
-    std::fs::write(path, bytes).map_err(|e| Error::io(path, "write", e))
+    Ok(bytes)
 }

@@ -129,6 +129,9 @@ impl<'a> Map<'a> {
         for layer in evidence {
             products.push(table(layer)?);
         }
+        if self.fusion.is_some() {
+            products.extend(self.scene.corrected_poses()?);
+        }
         if formats.iter().any(|f| f.takes_styles()) {
             let shown = layers.iter().filter(|l| l.geometry.is_some());
             products.extend(shown.map(|l| Product::new(format!("{}.qml", l.name), qgis::qml(l))));

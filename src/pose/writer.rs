@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use super::PoseSigma;
 use crate::error::Error;
 use crate::frame::{Body, Geodetic, LocalEnu, Rotation};
-use crate::input::write_rows;
+use crate::input::{rows_text, write_rows};
 
 /// One row of `poses.csv`. A column is written where at least one record has a value for it.
 #[derive(Debug, Clone)]
@@ -75,6 +75,14 @@ fn time_text(time_s: Option<f64>) -> Result<String, Error> {
 /// # Errors
 /// A file that cannot be written, or a time beyond the calendar.
 pub fn write_poses(path: &Path, records: &[PoseRecord]) -> Result<(), Error> {
+    std::fs::write(path, poses_text(records)?).map_err(|e| Error::io(path, "write", e))
+}
+
+/// The text of `poses.csv`, as [`write_poses`] writes it.
+///
+/// # Errors
+/// A time beyond the calendar.
+pub fn poses_text(records: &[PoseRecord]) -> Result<Vec<u8>, Error> {
     let text = |get: fn(&PoseRecord) -> &Option<String>| {
         records
             .iter()
@@ -112,7 +120,7 @@ pub fn write_poses(path: &Path, records: &[PoseRecord]) -> Result<(), Error> {
         columns.push(("sigma_pitch_deg", sigma(5, |s| s.pitch.to_degrees())));
         columns.push(("sigma_yaw_deg", sigma(5, |s| s.yaw.to_degrees())));
     }
-    write_rows(path, &columns)
+    rows_text(&columns)
 }
 
 /// Writes `images.csv`.

@@ -3,6 +3,7 @@
 use geo::{Coord, MultiPolygon, Polygon};
 
 use super::Scene;
+use super::corrected::Correction;
 use super::ground::Cartographer;
 use super::layer::{Column, Geometry, Kind, Layer, lon_lat, rounded};
 use super::rock::{Evidence, Rock, objects_covered};
@@ -16,7 +17,7 @@ const CORNERS: u32 = 64;
 /// Columns by what a row is.
 type OfRock<'a> = Column<'a, &'a Rock>;
 type OfFootprint<'a> = Column<'a, usize>;
-type OfView<'a> = Column<'a, (&'a View, Geodetic)>;
+type OfView<'a> = Column<'a, (&'a View, Geodetic, Option<Correction>)>;
 type OfWay<'a> = Column<'a, Way<'a>>;
 type OfDetection<'a> = Column<'a, (usize, &'a Placed, Geodetic, Ellipse)>;
 type OfMember<'a> = Column<'a, (&'a Rock, &'a Evidence, &'a Placed)>;
@@ -154,32 +155,38 @@ impl Scene<'_> {
         // Rounded first: what rounds up to a full turn is north.
         let yaw_deg = |yaw: f64| rounded(yaw.to_degrees(), 4).rem_euclid(360.0);
         let columns: Vec<OfView<'_>> = vec![
-            OfView::text("image_id", "the view", |(view, _)| {
+            OfView::text("image_id", "the view", |(view, ..)| {
                 Some(view.image_id.clone())
             }),
-            OfView::text("camera", "its camera", |(view, _)| {
+            OfView::text("camera", "its camera", |(view, ..)| {
                 view.camera_name().map(str::to_owned)
             }),
-            OfView::time("time", "when it was taken", |(view, _)| view.time),
-            OfView::real("height_m", 4, self.height_about(), |(_, place)| {
+            OfView::time("time", "when it was taken", |(view, ..)| view.time),
+            OfView::real("height_m", 4, self.height_about(), |(_, place, _)| {
                 self.height_m(*place)
             }),
-            OfView::real("yaw_deg", 4, "heading of the body, degrees", |(view, _)| {
-                view.yaw().map(yaw_deg)
+            OfView::real(
+                "yaw_deg",
+                4,
+                "heading of the body, degrees",
+                |(view, ..)| view.yaw().map(yaw_deg),
+            ),
+            OfView::real("pose_shift_m", 4, "how far its pose was moved, m", |row| {
+                row.2.map(|c| c.shift_m)
             }),
-            OfView::real("pose_shift_m", 4, "how far its pose was moved, m", |_| None),
             OfView::real(
                 "pose_turn_deg",
                 4,
                 "how far its pose was turned, degrees",
-                |_| None,
+                |row| row.2.map(|c| c.turn.to_degrees()),
             ),
         ];
         let about = ("views", "Views", "where every view was taken from");
-        let rows = self.views.iter().map(|view| {
+        let rows = self.views.iter().enumerate().map(|(i, view)| {
             let place = self.site.geodetic(view.origin());
             let point = Geometry::Point(lon_lat(place, self.site.planet()));
-            (view.image_id.clone(), Some(point), (view, place))
+            let row = (view, place, self.correction(i));
+            (view.image_id.clone(), Some(point), row)
         });
         self.layer(about, Kind::Point).filled(columns, rows)
     }

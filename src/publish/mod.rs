@@ -4,6 +4,7 @@
 
 pub mod annotate;
 mod annotated;
+mod corrected;
 mod csv_table;
 mod flatgeobuf;
 mod folder;

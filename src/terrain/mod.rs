@@ -136,6 +136,11 @@ impl Terrain {
         &self.geoid_grids
     }
 
+    /// Whether it is a surface of constant height.
+    pub fn is_constant_height(&self) -> bool {
+        matches!(self.shape, Shape::Constant(_))
+    }
+
     /// The ground on the vertical line of the ENU frame at an east and a north, metres; `None`
     /// where it is unknown. Far from the site's origin that line leans against the local vertical; the
     /// place is found by fixed-point steps, to 1e-9 m.

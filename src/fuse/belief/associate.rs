@@ -20,6 +20,8 @@ const OTHERS: f64 = 0.5;
 const LEAST_MEMBERSHIP: f64 = 0.01;
 /// Objects with less support are dropped.
 const LEAST_SUPPORT: f64 = 0.3;
+/// Looks less apart than this repeat each other.
+const REPEATS: f64 = 0.5;
 /// Memberships of which a detection may be the origin of its object.
 const ORIGIN: f64 = 0.05;
 
@@ -141,7 +143,7 @@ impl Engine<'_> {
         let x = &self.objects[object];
         neighbours
             .into_iter()
-            .any(|&v| self.apart(x, v, view, Repeats::Errors) < super::learn::knob(3, 0.5))
+            .any(|&v| self.apart(x, v, view, Repeats::Errors) < REPEATS)
     }
 
     /// The weight that each candidate had in the last round.
@@ -165,23 +167,13 @@ impl Engine<'_> {
         let candidates = &expectation.candidates;
         let view_of = |i: usize| self.looks[candidates[i].look].view;
         let indices: Vec<usize> = (0..candidates.len()).collect();
-        let by_view: Vec<&[usize]> = indices
-            .chunk_by(|&a, &b| view_of(a) == view_of(b))
-            .collect();
+        let by_view: Vec<&[usize]> = indices.chunk_by(|&a, &b| view_of(a) == view_of(b)).collect();
         let parts: Vec<Vec<f64>> = by_view
             .par_iter()
             .map_init(Exclusive::new, |exclusive, indices| {
                 let view = view_of(indices[0]);
-                let first_pair = indices
-                    .iter()
-                    .map(|&i| candidates[i].pair)
-                    .min()
-                    .unwrap_or(0);
-                let last_pair = indices
-                    .iter()
-                    .map(|&i| candidates[i].pair)
-                    .max()
-                    .unwrap_or(0);
+                let first_pair = indices.iter().map(|&i| candidates[i].pair).min().unwrap_or(0);
+                let last_pair = indices.iter().map(|&i| candidates[i].pair).max().unwrap_or(0);
                 let mut edges = Vec::new();
                 let mut weights = Vec::new();
                 let mut active = Vec::new();

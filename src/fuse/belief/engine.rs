@@ -1,11 +1,13 @@
 //! Everything fusion believes at one moment.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::algebra::{Square4, Square6, inverse6};
 use super::curve::Detectability;
 use super::data::{Look, Platform, PoseNow, looks, order, platforms};
 use super::expect::{Expected, expect};
+use super::ground::SmoothGround;
 use super::noise::{Scales, ln_add, variances};
 use super::single::Singleton;
 use super::{BeliefSettings, PoseCorrection};
@@ -110,6 +112,8 @@ pub(super) struct Background {
 #[derive(Clone)]
 pub(super) struct Engine<'a> {
     pub(super) surface: &'a dyn Surface,
+    /// The ground, where it is smooth.
+    pub(super) smooth: Option<Arc<SmoothGround>>,
     /// Height of the ground where the surface does not say, metres.
     pub(super) fallback_up_m: f64,
     pub(super) settings: &'a BeliefSettings,
@@ -177,6 +181,7 @@ impl<'a> Engine<'a> {
         };
         let mut engine = Self {
             surface: problem.surface,
+            smooth: None,
             fallback_up_m: 0.0,
             settings,
             ranges_m: (problem.min_range_m, problem.max_range_m),
@@ -202,6 +207,8 @@ impl<'a> Engine<'a> {
             object_cov: Vec::new(),
             edges: Vec::new(),
         };
+        let places = engine.poses.iter().map(|p| (p.origin.x, p.origin.y));
+        engine.smooth = SmoothGround::new(problem.surface, places).map(Arc::new);
         engine.index();
         engine.begin();
         engine
@@ -280,6 +287,9 @@ impl<'a> Engine<'a> {
 
     /// The ground below a place: its height and its slopes by east and north.
     pub(super) fn ground(&self, east_m: f64, north_m: f64) -> (f64, f64, f64) {
+        if let Some(ground) = self.smooth.as_ref().and_then(|s| s.at(east_m, north_m)) {
+            return ground;
+        }
         match self.surface.ground_at(east_m, north_m) {
             Some(ground) => {
                 let n = ground.normal.xyz();
@@ -309,8 +319,8 @@ impl<'a> Engine<'a> {
         pull[3] = -away / vs;
         information[0][0] += FAINT;
         information[1][1] += FAINT;
-        let ln_density =
-            -0.5 * height_m * height_m / vz - 0.5 * (2.0 * PI * vz).ln() + self.model.size.ln(x[3]);
+        let ln_density = -0.5 * height_m * height_m / vz - 0.5 * (2.0 * PI * vz).ln()
+            + self.model.size.ln(x[3]);
         Prior {
             information,
             pull,
@@ -370,10 +380,6 @@ impl<'a> Engine<'a> {
         for view in 0..self.n_views() {
             self.pose_cov[view] = self.pose_prior(view);
         }
-    }
-
-    pub(super) fn pose_cov_of(information: &Square6) -> Option<Square6> {
-        Some(inverse6(information)?.0)
     }
 }
 

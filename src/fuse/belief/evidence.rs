@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::algebra::{Factor4, Square4, add_object_information, inverse4, pose_spread};
 use super::engine::Engine;
 use super::looks::Repeats;
-use super::noise::{log_likelihood, with_noise};
+use super::noise::{ln_add, log_likelihood, with_noise};
 use super::pairs::{Expectation, Pair};
 
 /// Detection probabilities below this are taken for it where there was a detection.
@@ -21,8 +21,59 @@ pub(super) struct Evidence {
     pub(super) worth: Vec<f64>,
     /// How many independent detections every edge is worth.
     pub(super) edge_worth: Vec<f64>,
-    /// Log-odds that each object exists.
+    /// Log-odds that each object exists, against clutter.
     pub(super) log_odds: Vec<f64>,
+    /// Log-odds of a thing that is seldom detected against each object.
+    seldom: Vec<f64>,
+}
+
+impl Evidence {
+    /// Log-odds that each object exists, against clutter and things that are seldom detected.
+    ///
+    /// While fusion is on its way, detection probabilities are rough, and objects that they do not
+    /// fit would be lost; so this is asked at the end.
+    pub(super) fn final_log_odds(&self) -> Vec<f64> {
+        let seldom = self.log_odds.iter().zip(&self.seldom);
+        seldom.map(|(l, s)| l - ln_add(0.0, l + s)).collect()
+    }
+}
+
+/// One in so many things that stand still and are detected is none of the objects: seldom seen, by
+/// an odd angle or light, and not what the detector was made for.
+const SELDOM: f64 = 0.01;
+/// How often such a thing is detected: a Beta distribution.
+const SELDOM_RATE: (f64, f64) = (1.0, 4.0);
+
+/// How often an object was detected, and what that is worth if it is one.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rate {
+    hits: f64,
+    misses: f64,
+    ln_object: f64,
+}
+
+impl Rate {
+    fn hit(&mut self, weight: f64, ln: f64) {
+        self.hits += weight;
+        self.ln_object += ln;
+    }
+
+    fn miss(&mut self, weight: f64, ln: f64) {
+        self.misses += weight;
+        self.ln_object += ln;
+    }
+
+    /// Log-odds of a thing that is seldom detected against an object.
+    fn seldom(&self) -> f64 {
+        let (a, b) = SELDOM_RATE;
+        let seen = ln_beta(a + self.hits, b + self.misses) - ln_beta(a, b);
+        SELDOM.ln() + seen - self.ln_object
+    }
+}
+
+/// Logarithm of Euler's beta function.
+fn ln_beta(a: f64, b: f64) -> f64 {
+    libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b)
 }
 
 /// The probability of log-odds.
@@ -51,6 +102,7 @@ impl Engine<'_> {
         let edge_worth = self.worth(&self.objects, &of_edges, Repeats::Detection);
         let mut detected = vec![0.0; pairs.len()];
         let mut log_odds = vec![self.model.density.ln(); self.objects.len()];
+        let mut rates = vec![Rate::default(); self.objects.len()];
         let mut information: Vec<Square4> = Vec::with_capacity(self.objects.len());
         for (x, l) in self.objects.iter().zip(&mut log_odds) {
             let prior = self.prior(x);
@@ -65,7 +117,9 @@ impl Engine<'_> {
             }
             let weight = edge.weight * worth;
             let p = pair.map_or(0.0, |p| pairs[p].p_detect);
-            log_odds[k] += weight * p.max(LEAST_DETECTION).ln();
+            let for_hit = weight * p.max(LEAST_DETECTION).ln();
+            log_odds[k] += for_hit;
+            rates[k].hit(weight, for_hit);
             let Some(seen) = self.expect(look.view, &self.objects[k]) else {
                 continue;
             };
@@ -87,10 +141,16 @@ impl Engine<'_> {
         }
         for ((pair, q), worth) in pairs.iter().zip(&mut detected).zip(&worth) {
             *q = q.min(1.0);
-            log_odds[pair.object] += worth * (1.0 - *q) * (-pair.p_detect).ln_1p();
+            let weight = worth * (1.0 - *q);
+            let for_miss = weight * (-pair.p_detect).ln_1p();
+            log_odds[pair.object] += for_miss;
+            rates[pair.object].miss(weight * pair.inside, for_miss);
         }
+
+        let seldom = rates.iter().map(Rate::seldom).collect();
         Evidence {
             expectation,
+            seldom,
             detected,
             worth,
             edge_worth,

@@ -49,8 +49,8 @@ impl Engine<'_> {
         for i in index(origin.x - most_m)..=index(origin.x + most_m) {
             for j in index(origin.y - most_m)..=index(origin.y + most_m) {
                 let (east_m, north_m) = ((i as f64 + 0.5) * step_m, (j as f64 + 0.5) * step_m);
-                let range_m = (east_m - origin.x).hypot(north_m - origin.y);
-                if range_m < least_m || range_m > most_m {
+                let range2 = (east_m - origin.x).powi(2) + (north_m - origin.y).powi(2);
+                if range2 < least_m * least_m || range2 > most_m * most_m {
                     continue;
                 }
                 let up_m = self.ground(east_m, north_m).0;

@@ -205,7 +205,7 @@ impl Engine<'_> {
         #[expect(clippy::cast_precision_loss, reason = "a count of views")]
         let n_views = self.n_views() as f64 + 1.0;
         self.model.clutter = clutter / n_views;
-        self.model.transients = transients / n_views / self.view_area_m2 * knob(0, 1.0);
+        self.model.transients = transients / n_views / self.view_area_m2;
         let mut missed = vec![0.0; self.objects.len()];
         for (pair, worth) in evidence.expectation.pairs.iter().zip(&evidence.worth) {
             missed[pair.object] += worth * (-pair.p_detect).ln_1p();
@@ -231,10 +231,7 @@ impl Engine<'_> {
         let total: f64 = sizes.iter().map(|s| s.0).sum();
         if total > 5.0 {
             let mean = sizes.iter().map(|(w, l)| w * l).sum::<f64>() / total;
-            let scatter = sizes
-                .iter()
-                .map(|(w, l)| w * (l - mean).powi(2))
-                .sum::<f64>();
+            let scatter = sizes.iter().map(|(w, l)| w * (l - mean).powi(2)).sum::<f64>();
             self.model.clutter_size.mean = mean;
             self.model.clutter_size.variance =
                 (scatter / total + 0.02).clamp(CLUTTER_VARIANCES.0, CLUTTER_VARIANCES.1);
@@ -322,8 +319,5 @@ impl Engine<'_> {
 
 /// Experiments.
 pub(super) fn knob(i: usize, default: f64) -> f64 {
-    std::env::var(format!("KNOB{i}"))
-        .ok()
-        .and_then(|v| v.parse().ok())
-        .unwrap_or(default)
+    std::env::var(format!("KNOB{i}")).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }

@@ -92,7 +92,7 @@ impl Engine<'_> {
                 }
                 let y = &self.objects[b];
                 let d = [x[0] - y[0], x[1] - y[1]];
-                if d[0].hypot(d[1]) > reach_m {
+                if d[0] * d[0] + d[1] * d[1] > reach_m * reach_m {
                     continue;
                 }
                 let c = |i: usize, j: usize| cov[a][i][j] + cov[b][i][j];
@@ -196,7 +196,8 @@ impl Engine<'_> {
             return 0.0;
         };
         let (_, by_pose) = seen.of(look);
-        let spread = super::algebra::pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
+        let spread =
+            super::algebra::pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
         let found = super::noise::log_likelihood(
             &seen.residual(look),
             &spread,

@@ -1,12 +1,12 @@
 //! Belief fusion.
 mod algebra;
-mod associate;
 mod curve;
 mod data;
 mod engine;
 mod evidence;
 mod expect;
 mod footprint;
+mod ground;
 mod learn;
 mod looks;
 mod merge;
@@ -17,9 +17,10 @@ mod pairs;
 mod register;
 mod sequence;
 mod single;
+mod associate;
 mod solve;
 
-pub use outcome::{Belief, BeliefEvidence, BeliefObject, Single, fuse_belief};
+pub use outcome::{fuse_belief, Belief, BeliefObject, BeliefEvidence, Single};
 
 /// How poses are corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -58,15 +58,14 @@ pub(super) fn log_likelihood(
     spread: &Square4,
     variances: &[f64; 4],
     (n, n_rows): (usize, f64),
-) -> Option<(f64, f64, f64)> {
+) -> Option<(f64, f64)> {
     let unit = 0.5 * n_rows * (2.0 * std::f64::consts::PI).ln();
     let narrow = Factor4::new(&with_noise(spread, variances, 1.0), n)?;
     let (wide, gap) = wide_factor(spread, variances, (n, n_rows))?;
     let m2 = wide.mahalanobis2(e);
-    let narrow2 = narrow.mahalanobis2(e);
-    let a = (1.0 - CONTAMINATION).ln() - 0.5 * narrow2 - 0.5 * narrow.ln_det;
+    let a = (1.0 - CONTAMINATION).ln() - 0.5 * narrow.mahalanobis2(e) - 0.5 * narrow.ln_det;
     let b = CONTAMINATION.ln() - 0.5 * m2 - 0.5 * (wide.ln_det - gap);
-    Some((ln_add(a, b) - unit, m2, narrow2))
+    Some((ln_add(a, b) - unit, m2))
 }
 
 /// The factor of the wide component, and what rows without a reading add to its determinant.

@@ -1,13 +1,14 @@
 //! The whole method, and what comes of it.
 
 use nalgebra::{Matrix3, Matrix6, Vector6};
+use rayon::prelude::*;
 use serde::Serialize;
 
-use super::BeliefSettings;
 use super::algebra::{Square4, to_matrix6};
 use super::engine::Engine;
 use super::evidence::{Evidence, probability};
 use super::solve::Robust;
+use super::BeliefSettings;
 use crate::adjust::Problem;
 use crate::frame::{Enu, Point};
 use crate::fuse::Member;
@@ -18,6 +19,8 @@ const ROUNDS: usize = 12;
 const LEAST_ROUNDS: usize = 3;
 /// They are over where no object moves farther, metres.
 const STILL_M: f64 = 1e-3;
+/// Registration is tried again where more than this share of the detections changed company.
+const DOUBT: f64 = 0.03;
 /// Squared scales of the robust steps between registration and association.
 const SCHEDULE: [f64; 7] = [400.0, 100.0, 100.0, 25.0, 25.0, 9.0, 9.0];
 
@@ -73,6 +76,10 @@ pub struct BeliefEvidence {
     pub n_observations: usize,
     /// Candidates when it stopped.
     pub n_objects: usize,
+    /// Orders of the views that were tried.
+    pub n_starts: usize,
+    /// The share of detections that the rounds gave other company than registration.
+    pub doubt: f64,
     /// Rounds done.
     pub rounds: usize,
     /// Whether nothing changed any more.
@@ -96,46 +103,92 @@ pub struct BeliefEvidence {
 }
 
 /// Fuses measurements of many views into one map.
+///
+/// Where the rounds of association undo much of what registration did, registration is tried again
+/// with what was learnt, in both directions, and the most probable of the three maps is taken.
 pub fn fuse_belief(problem: &Problem<'_>, settings: &BeliefSettings) -> Belief {
     let fresh = Engine::new(problem, settings);
-    let order: Vec<usize> = (0..fresh.n_views()).collect();
-    let mut engine = fresh.clone();
-    engine.sequence(&order);
-    let (mut evidence, mut rounds, mut converged) = engine.refine();
-    let mut best = engine.objective(&evidence);
-    let debug = std::env::var("DEBUGJ").is_ok();
-    if debug {
-        eprintln!("J first {best:.1}");
-    }
-    let n_pass = super::learn::knob(4, 1.0) as usize;
-    for pass in 1..n_pass {
-        let mut again = fresh.clone();
-        again.model = engine.model.clone();
-        again.reset_pose_cov();
-        again.settle();
-        again.weigh_background();
-        let mut order = order.clone();
-        if pass == 2 {
-            order.reverse();
-        }
-        again.sequence(&order);
-        let (e, r, c) = again.refine();
-        let j = again.objective(&e);
-        if debug {
-            eprintln!("J pass {pass} {j:.1}");
-        }
-        if j > best {
-            best = j;
-            engine = again;
-            evidence = e;
-            rounds = r;
-            converged = c;
+    let forward: Vec<usize> = (0..fresh.n_views()).collect();
+    let backward: Vec<usize> = forward.iter().rev().copied().collect();
+    let mut best = Start::new(fresh.clone(), &forward);
+    let mut n_starts = 1;
+    if best.doubt > DOUBT && fresh.corrects_poses() {
+        let model = best.engine.model.clone();
+        let again: Vec<Start<'_>> = [forward, backward]
+            .par_iter()
+            .map(|order| {
+                let mut engine = fresh.clone();
+                engine.model = model.clone();
+                engine.reset_pose_cov();
+                engine.settle();
+                engine.weigh_background();
+                Start::new(engine, order)
+            })
+            .collect();
+        for start in again {
+            n_starts += 1;
+            if start.objective > best.objective {
+                best = start;
+            }
         }
     }
-    engine.outcome(problem, evidence, (rounds, converged))
+    best.outcome(problem, n_starts)
+}
+
+/// A map from one order of the views.
+struct Start<'a> {
+    engine: Engine<'a>,
+    rounds: usize,
+    converged: bool,
+    /// The share of detections that the rounds gave other company than registration.
+    doubt: f64,
+    /// Logarithm of the posterior.
+    objective: f64,
+}
+
+impl<'a> Start<'a> {
+    fn new(mut engine: Engine<'a>, order: &[usize]) -> Self {
+        engine.sequence(order);
+        let before = engine.partners();
+        let (evidence, rounds, converged) = engine.refine();
+        let after = engine.partners();
+        let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
+        #[expect(clippy::cast_precision_loss, reason = "counts")]
+        let doubt = changed as f64 / before.len().max(1) as f64;
+        Self {
+            objective: engine.objective(&evidence),
+            engine,
+            rounds,
+            converged,
+            doubt,
+        }
+    }
+
+    fn outcome(mut self, problem: &Problem<'_>, n_starts: usize) -> Belief {
+        let mut belief = self.engine.outcome(problem, self.rounds, self.converged);
+        belief.evidence.n_starts = n_starts;
+        belief.evidence.doubt = self.doubt;
+        belief
+    }
 }
 
 impl Engine<'_> {
+    /// Of every look the look before it of the same object.
+    fn partners(&self) -> Vec<Option<usize>> {
+        let owners = self.owners();
+        let mut last = vec![None; self.objects.len()];
+        owners
+            .iter()
+            .enumerate()
+            .map(|(look, owner)| {
+                let before = &mut last[(*owner)?];
+                let found = *before;
+                *before = Some(look);
+                found
+            })
+            .collect()
+    }
+
     /// Stage B: rounds of association, adjustment and learning.
     fn refine(&mut self) -> (Evidence, usize, bool) {
         for c2 in SCHEDULE {
@@ -195,12 +248,22 @@ impl Engine<'_> {
     fn outcome(
         &mut self,
         problem: &Problem<'_>,
-        _: Evidence,
-        (rounds, converged): (usize, bool),
+        rounds: usize,
+        converged: bool,
     ) -> Belief {
         let stepped = self.adjust(3, Robust::Contaminated, true);
         self.weigh_background();
         let evidence = self.weigh(self.expectation());
+        if std::env::var("DEBUGL").is_ok() {
+            for k in 0..self.objects.len() {
+                let (mut hw, mut hn) = (0.0, 0.0);
+                for (e, w) in self.edges.iter().zip(&evidence.edge_worth) { if e.object == k { hw += w * e.weight; hn += e.weight; } }
+                let (mut mw, mut mn, mut ml) = (0.0, 0.0, 0.0);
+                for ((p, q), w) in evidence.expectation.pairs.iter().zip(&evidence.detected).zip(&evidence.worth) { if p.object == k { mw += w * (1.0 - q); mn += 1.0 - q; ml += w * (1.0 - q) * (-p.p_detect).ln_1p(); } }
+                eprintln!("{k} L {:.1} hits {hn:.1} worth {hw:.1} misses {mn:.1} worth {mw:.1} ln {ml:.1} x {:?}", evidence.log_odds[k], self.objects[k]);
+            }
+        }
+        let log_odds = evidence.final_log_odds();
         let (cov, pose_cov) = stepped
             .and_then(|s| s.marginal)
             .unwrap_or_else(|| (self.object_cov.clone(), Vec::new()));
@@ -222,7 +285,7 @@ impl Engine<'_> {
                     covariance: place_cov(&cov[k]),
                     size_m: self.has_sizes.then(|| x[3].exp()),
                     class: self.classes[k],
-                    p_exist: probability(evidence.log_odds[k]),
+                    p_exist: probability(log_odds[k]),
                     weight: support[k],
                     members,
                 }
@@ -262,6 +325,8 @@ impl Engine<'_> {
             evidence: BeliefEvidence {
                 n_observations: self.looks.len(),
                 n_objects: self.objects.len(),
+                n_starts: 1,
+                doubt: 0.0,
                 rounds,
                 converged,
                 noise_scales: m.scales,

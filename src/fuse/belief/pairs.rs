@@ -52,8 +52,6 @@ pub(super) struct Candidate {
     /// Index of its pair.
     pub(super) pair: usize,
     pub(super) ln_likelihood: f64,
-    /// Squared Mahalanobis distance under the narrow noise.
-    pub(super) narrow2: f64,
 }
 
 /// A candidate with its residual, its derivatives and its noise.
@@ -120,10 +118,11 @@ impl Engine<'_> {
         for (pairs, candidates) in views {
             let offset = all.pairs.len();
             all.pairs.extend(pairs);
-            all.candidates.extend(candidates.iter().map(|c| Candidate {
-                pair: c.pair + offset,
-                ..*c
-            }));
+            all.candidates
+                .extend(candidates.iter().map(|c| Candidate {
+                    pair: c.pair + offset,
+                    ..*c
+                }));
         }
         all
     }
@@ -144,8 +143,8 @@ impl Engine<'_> {
         let reach_m = self.search_m();
         for k in among.near.about(origin.x, origin.y, reach_m) {
             let x = &among.objects[k];
-            let away = (x[0] - origin.x).hypot(x[1] - origin.y);
-            if away > reach_m {
+            let away2 = (x[0] - origin.x).powi(2) + (x[1] - origin.y).powi(2);
+            if away2 > reach_m * reach_m {
                 continue;
             }
             if let Some(mut pair) = self.pair(view, k, x, &among.cov[k], pose_cov) {
@@ -253,13 +252,12 @@ impl Engine<'_> {
         }
         let spread = struck(&pair.spread, &detection.has);
         let rows = (detection.n, detection.n_rows());
-        let (ln_likelihood, m2, narrow2) = log_likelihood(&e, &spread, &loose, rows)?;
+        let (ln_likelihood, m2) = log_likelihood(&e, &spread, &loose, rows)?;
         (m2 < GATE).then_some(CandidateInFull {
             candidate: Candidate {
                 look,
                 pair: index,
                 ln_likelihood,
-                narrow2,
             },
             e,
             variances: loose,

@@ -32,6 +32,8 @@ struct Growing {
     /// Log-odds that they exist, and the probabilities as registration takes them.
     log_odds: Vec<f64>,
     exist: Vec<f64>,
+    /// The last view that expected each to be seen.
+    last: Vec<Option<usize>>,
     near: Buckets,
     /// The object of each look.
     own: Vec<Option<usize>>,
@@ -40,6 +42,14 @@ struct Growing {
     /// Information of looks that have left the window, and its product with the place.
     folded: Vec<Square4>,
     toward: Vec<[f64; 4]>,
+}
+
+impl Growing {
+    /// How much of a view's look at an object is new: little soon after the last.
+    fn news(&self, engine: &Engine<'_>, object: usize, view: usize) -> f64 {
+        let x = &self.objects[object];
+        self.last[object].map_or(1.0, |last| engine.apart(x, last, view, Repeats::Detection))
+    }
 }
 
 impl Engine<'_> {
@@ -51,6 +61,7 @@ impl Engine<'_> {
             classes: Vec::new(),
             log_odds: Vec::new(),
             exist: Vec::new(),
+            last: Vec::new(),
             near: Buckets::new(self.bucket_m()),
             own: vec![None; self.looks.len()],
             worth: vec![1.0; self.looks.len()],
@@ -63,10 +74,9 @@ impl Engine<'_> {
                 self.take_in(view, &mut map, &mut exclusive);
             }
             self.found_new(view, &mut map);
-            let w = super::learn::knob(6, 24.0) as usize;
-            let window = &order[(at + 1).saturating_sub(w)..=at];
-            if at >= w {
-                self.fold(order[at - w], &mut map);
+            let window = &order[(at + 1).saturating_sub(WINDOW)..=at];
+            if at >= WINDOW {
+                self.fold(order[at - WINDOW], &mut map);
             }
             self.settle_window(view, window, &mut map);
         }
@@ -121,7 +131,7 @@ impl Engine<'_> {
         let mut joining: Vec<usize> = (0..p.len())
             .filter(|&i| {
                 let look = found.candidates[i].candidate.look;
-                total[look - first] > JOINS && p[i] > super::learn::knob(5, LEAST_MEMBERSHIP)
+                total[look - first] > JOINS && p[i] > LEAST_MEMBERSHIP
             })
             .collect();
         joining.sort_by(|&a, &b| p[b].total_cmp(&p[a]).then(a.cmp(&b)));
@@ -133,16 +143,18 @@ impl Engine<'_> {
                 taken.push(object);
                 map.own[c.look] = Some(object);
                 let clutter = self.background[c.look].clutter;
-                map.log_odds[object] +=
-                    c.ln_likelihood - clutter + found.pairs[c.pair].pair.p_detect.max(0.02).ln();
+                map.log_odds[object] += map.news(self, object, view)
+                    * (c.ln_likelihood - clutter
+                        + found.pairs[c.pair].pair.p_detect.max(0.02).ln());
             }
         }
         for pair in &found.pairs {
             let k = pair.pair.object;
             if !taken.contains(&k) {
-                map.log_odds[k] += (-pair.pair.p_detect).ln_1p();
+                map.log_odds[k] += map.news(self, k, view) * (-pair.pair.p_detect).ln_1p();
             }
             map.exist[k] = likely(map.log_odds[k]);
+            map.last[k] = Some(view);
         }
     }
 
@@ -162,6 +174,7 @@ impl Engine<'_> {
             let background = &self.background[look];
             map.log_odds.push(background.new - background.clutter);
             map.exist.push(likely(background.new - background.clutter));
+            map.last.push(Some(view));
             map.folded.push([[0.0; 4]; 4]);
             map.toward.push([0.0; 4]);
         }
@@ -176,8 +189,8 @@ impl Engine<'_> {
                 continue;
             };
             let detection = &self.looks[look];
-            let weight =
-                map.worth[look] * robust_weight(&e, &self.looseness[look], detection.n_rows());
+            let weight = map.worth[look]
+                * robust_weight(&e, &self.looseness[look], detection.n_rows());
             let mut a = [[0.0; 4]; 4];
             super::algebra::add_object_information(&mut a, &h, &m, n, weight);
             for i in 0..4 {
@@ -204,9 +217,7 @@ impl Engine<'_> {
             let looks = moving.iter().flat_map(|&v| self.looks_of(v));
             looks.filter_map(|look| map.own[look]).collect()
         } else {
-            self.looks_of(view)
-                .filter_map(|look| map.own[look])
-                .collect()
+            self.looks_of(view).filter_map(|look| map.own[look]).collect()
         };
         touched.sort_unstable();
         touched.dedup();
@@ -271,5 +282,5 @@ impl Engine<'_> {
 /// Registration never takes an object for certain, one way or the other: its own beginnings are
 /// rough.
 fn likely(log_odds: f64) -> f64 {
-    probability(log_odds).clamp(super::learn::knob(7, 0.1), super::learn::knob(8, 0.9))
+    probability(log_odds).clamp(0.1, 0.9)
 }

@@ -16,6 +16,8 @@ use crate::adjust::arrow::{Arrow, Solved};
 const STEP_SHARE: f64 = 0.2;
 /// ... and by this at least and at most, metres.
 const STEP_M: (f64, f64) = (0.3, 5.0);
+/// From so many edges on their rows are computed in parallel, so many at a time.
+const CHUNK: usize = 8192;
 /// Logarithms of sizes move by at most this.
 const STEP_SIZE: f64 = 0.5;
 
@@ -66,50 +68,35 @@ struct Row {
 impl Engine<'_> {
     /// One Gauss-Newton step, which moves the objects of the part and the poses of its views.
     pub(super) fn step(&mut self, part: Part<'_>, robust: Robust, marginals: bool) -> Stepped {
-        let rows = self.rows(&part, robust);
-        let n = part.objects.len();
-        let mut information = Vec::with_capacity(n);
-        let mut pull = Vec::with_capacity(n);
-        for (k, x) in part.objects.iter().enumerate() {
-            let prior = self.prior(x);
-            let (mut a, mut b) = (prior.information, prior.pull);
-            if let Some((folded, toward)) = part.folded {
-                for i in 0..4 {
-                    b[i] += toward[k][i];
-                    for j in 0..4 {
-                        a[i][j] += folded[k][i][j];
-                        b[i] -= folded[k][i][j] * x[j];
-                    }
+        let mut normal = self.begin_normal(&part);
+        if part.edges.len() < CHUNK {
+            for (edge, worth) in part.edges.iter().zip(part.worth) {
+                if let Some(row) = self.row(edge, *worth, part.objects, robust) {
+                    normal.add(&row, part.moving, self.corrects_poses());
                 }
             }
-            information.push(a);
-            pull.push(b);
-        }
-        let mut nearest_m = vec![f64::INFINITY; n];
-        for row in &rows {
-            let k = row.object;
-            nearest_m[k] = nearest_m[k].min(row.range_m);
-            add_object_information(
-                &mut information[k],
-                &row.by_object,
-                &row.information,
-                row.n,
-                1.0,
-            );
-            let toward = row.toward();
-            for (p, h) in pull[k].iter_mut().zip(row.object_pull(&toward)) {
-                *p += h;
+        } else {
+            let chunks = part.edges.chunks(CHUNK).zip(part.worth.chunks(CHUNK));
+            for (edges, worths) in chunks {
+                let objects: &[[f64; 4]] = part.objects;
+                let rows: Vec<Option<Row>> = edges
+                    .par_iter()
+                    .zip(worths)
+                    .map(|(edge, worth)| self.row(edge, *worth, objects, robust))
+                    .collect();
+                for row in rows.iter().flatten() {
+                    normal.add(row, part.moving, self.corrects_poses());
+                }
             }
         }
-        let conditional: Vec<Square4> = information.iter().map(inverse_or_zero).collect();
+        let conditional: Vec<Square4> = normal.information.iter().map(inverse_or_zero).collect();
+        let nearest_m = std::mem::take(&mut normal.nearest_m);
         let (steps, marginal) = if self.corrects_poses() {
-            self.joint(&part, &rows, &information, &pull, marginals)
+            self.joint(normal, part.moving, marginals)
         } else {
-            let steps = conditional.iter().zip(&pull).map(|(c, b)| times(c, b));
-            (
-                steps.collect(),
-                marginals.then(|| (conditional.clone(), Vec::new())),
-            )
+            let steps = conditional.iter().zip(&normal.pull);
+            let steps = steps.map(|(c, b)| times(c, b)).collect();
+            (steps, marginals.then(|| (conditional.clone(), Vec::new())))
         };
         let mut move_m = 0.0f64;
         for ((x, step), nearest_m) in part.objects.iter_mut().zip(&steps).zip(&nearest_m) {
@@ -132,110 +119,111 @@ impl Engine<'_> {
         }
     }
 
-    fn rows(&self, part: &Part<'_>, robust: Robust) -> Vec<Row> {
-        let corrects = self.corrects_poses();
-        let row = |(edge, worth): (&Edge, &f64)| {
-            let look = &self.looks[edge.look];
-            let seen = self.expect(look.view, &part.objects[edge.object])?;
-            let e = seen.residual(look);
-            let variances = &self.looseness[edge.look];
-            let (by_object, by_pose) = seen.of(look);
-            let trust = match robust {
-                Robust::Contaminated => robust_weight(&e, variances, look.n_rows()),
-                Robust::Scale(c2) => {
-                    let m2: f64 = (0..2).map(|r| e[r] * e[r] / variances[r]).sum::<f64>()
-                        + if look.is_bearing() {
-                            e[3] * e[3] / variances[3]
-                        } else {
-                            0.0
-                        };
-                    (c2 / (c2 + m2)).powi(2)
-                }
-            };
-            let weight = edge.weight * worth * trust;
-            let mut information = [[0.0; 4]; 4];
-            if corrects {
-                for r in 0..look.n {
-                    if look.has[r] {
-                        information[r][r] = weight / variances[r];
-                    }
-                }
-            } else {
-                let spread = pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
-                let factor = Factor4::new(&with_noise(&spread, variances, 1.0), look.n)?;
-                information = factor.inverse();
-                for (r, row) in information.iter_mut().enumerate() {
-                    for (c, value) in row.iter_mut().enumerate() {
-                        let counts = look.has[r] && look.has[c];
-                        *value *= if counts { weight } else { 0.0 };
+    /// The normal equations before any look: priors, and looks that were folded into objects.
+    fn begin_normal(&self, part: &Part<'_>) -> Normal {
+        let n = part.objects.len();
+        let mut normal = Normal {
+            information: Vec::with_capacity(n),
+            pull: Vec::with_capacity(n),
+            nearest_m: vec![f64::INFINITY; n],
+            poses: Vec::new(),
+            couplings: Vec::new(),
+        };
+        for (k, x) in part.objects.iter().enumerate() {
+            let prior = self.prior(x);
+            let (mut a, mut b) = (prior.information, prior.pull);
+            if let Some((folded, toward)) = part.folded {
+                for i in 0..4 {
+                    b[i] += toward[k][i];
+                    for j in 0..4 {
+                        a[i][j] += folded[k][i][j];
+                        b[i] -= folded[k][i][j] * x[j];
                     }
                 }
             }
-            Some(Row {
-                object: edge.object,
-                view: look.view,
-                range_m: seen.range_m,
-                by_object,
-                by_pose,
-                n: look.n,
-                e,
-                information,
-            })
-        };
-        let pairs = part.edges.par_iter().zip(part.worth);
-        pairs
-            .map(row)
-            .collect::<Vec<_>>()
-            .into_iter()
-            .flatten()
-            .collect()
-    }
-
-    /// Objects and poses together; the poses move here, the steps of the objects are returned.
-    #[expect(
-        clippy::type_complexity,
-        reason = "steps, and covariances where asked for"
-    )]
-    fn joint(
-        &mut self,
-        part: &Part<'_>,
-        rows: &[Row],
-        information: &[Square4],
-        pull: &[[f64; 4]],
-        marginals: bool,
-    ) -> (Vec<[f64; 4]>, Option<(Vec<Square4>, Vec<Square6>)>) {
-        let moving = part.moving;
-        let mut poses: Vec<(SMatrix<f64, 6, 6>, Vector6<f64>)> = moving
-            .iter()
-            .map(|&view| {
+            normal.information.push(a);
+            normal.pull.push(b);
+        }
+        if self.corrects_poses() {
+            normal.couplings.reserve(part.edges.len());
+            normal.poses.extend(part.moving.iter().map(|&view| {
                 let prior = Vector6::from(self.pose_information(view));
                 let at = Vector6::from(self.delta[view]);
                 (SMatrix::from_diagonal(&prior), -prior.component_mul(&at))
-            })
-            .collect();
-        let mut couplings: Vec<(usize, usize, SMatrix<f64, 4, 6>)> = Vec::new();
-        for row in rows {
-            let Ok(p) = moving.binary_search(&row.view) else {
-                continue;
-            };
-            let toward = row.toward();
-            let (a, b) = &mut poses[p];
-            row.add_to_pose(a, b, &toward);
-            couplings.push((row.object, p, row.coupling()));
+            }));
         }
-        let objects: Vec<(SMatrix<f64, 4, 4>, Vector4<f64>)> = information
+        normal
+    }
+
+    fn row(&self, edge: &Edge, worth: f64, objects: &[[f64; 4]], robust: Robust) -> Option<Row> {
+        let look = &self.looks[edge.look];
+        let seen = self.expect(look.view, &objects[edge.object])?;
+        let e = seen.residual(look);
+        let variances = &self.looseness[edge.look];
+        let (by_object, by_pose) = seen.of(look);
+        let trust = match robust {
+            Robust::Contaminated => robust_weight(&e, variances, look.n_rows()),
+            Robust::Scale(c2) => {
+                let mut m2: f64 = (0..2).map(|r| e[r] * e[r] / variances[r]).sum();
+                if look.is_bearing() {
+                    m2 += e[3] * e[3] / variances[3];
+                }
+                (c2 / (c2 + m2)).powi(2)
+            }
+        };
+        let weight = edge.weight * worth * trust;
+        let mut information = [[0.0; 4]; 4];
+        if self.corrects_poses() {
+            for r in 0..look.n {
+                if look.has[r] {
+                    information[r][r] = weight / variances[r];
+                }
+            }
+        } else {
+            let spread = pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
+            let factor = Factor4::new(&with_noise(&spread, variances, 1.0), look.n)?;
+            information = factor.inverse();
+            for (r, row) in information.iter_mut().enumerate() {
+                for (c, value) in row.iter_mut().enumerate() {
+                    let counts = look.has[r] && look.has[c];
+                    *value *= if counts { weight } else { 0.0 };
+                }
+            }
+        }
+        Some(Row {
+            object: edge.object,
+            view: look.view,
+            range_m: seen.range_m,
+            by_object,
+            by_pose,
+            n: look.n,
+            e,
+            information,
+        })
+    }
+
+    /// Objects and poses together; the poses move here, the steps of the objects are returned.
+    #[expect(clippy::type_complexity, reason = "steps, and covariances where asked for")]
+    fn joint(
+        &mut self,
+        normal: Normal,
+        moving: &[usize],
+        marginals: bool,
+    ) -> (Vec<[f64; 4]>, Option<(Vec<Square4>, Vec<Square6>)>) {
+        let objects: Vec<ObjectBlock> = normal
+            .information
             .iter()
-            .zip(pull)
+            .zip(&normal.pull)
             .map(|(a, b)| (to_matrix4(a), Vector4::from(*b)))
             .collect();
-        let solution = if 4 * objects.len() < 6 * poses.len() {
-            objects_kept(objects, poses, couplings, marginals)
+        let n_objects = objects.len();
+        let solution = if 4 * objects.len() < 6 * normal.poses.len() {
+            objects_kept(objects, normal.poses, &normal.couplings, marginals)
         } else {
-            poses_kept(objects, poses, couplings, marginals)
+            poses_kept(objects, normal.poses, &normal.couplings, marginals)
         };
         let Some((steps, turns, marginal)) = solution else {
-            let still = vec![[0.0; 4]; information.len()];
-            return (still, None);
+            return (vec![[0.0; 4]; n_objects], None);
         };
         for (&view, turn) in moving.iter().zip(&turns) {
             let mut delta = self.delta[view];
@@ -353,12 +341,7 @@ impl Engine<'_> {
     }
 
     /// Gauss-Newton steps of all objects and poses; with marginal covariances of the last if asked.
-    pub(super) fn adjust(
-        &mut self,
-        steps: usize,
-        robust: Robust,
-        marginals: bool,
-    ) -> Option<Stepped> {
+    pub(super) fn adjust(&mut self, steps: usize, robust: Robust, marginals: bool) -> Option<Stepped> {
         let edges = std::mem::take(&mut self.edges);
         let mut objects = std::mem::take(&mut self.objects);
         let of: Vec<(usize, usize)> = edges
@@ -393,6 +376,34 @@ impl Engine<'_> {
     }
 }
 
+/// The normal equations on their way.
+struct Normal {
+    information: Vec<Square4>,
+    pull: Vec<[f64; 4]>,
+    /// How near the nearest view of each object is, metres.
+    nearest_m: Vec<f64>,
+    poses: Vec<PoseBlock>,
+    couplings: Vec<Coupling>,
+}
+
+impl Normal {
+    fn add(&mut self, row: &Row, moving: &[usize], corrects_poses: bool) {
+        let k = row.object;
+        self.nearest_m[k] = self.nearest_m[k].min(row.range_m);
+        let a = &mut self.information[k];
+        add_object_information(a, &row.by_object, &row.information, row.n, 1.0);
+        let toward = row.toward();
+        for (p, h) in self.pull[k].iter_mut().zip(row.object_pull(&toward)) {
+            *p += h;
+        }
+        if corrects_poses && let Ok(p) = moving.binary_search(&row.view) {
+            let (a, b) = &mut self.poses[p];
+            row.add_to_pose(a, b, &toward);
+            self.couplings.push((k, p, row.coupling()));
+        }
+    }
+}
+
 impl Row {
     /// The weighted residual.
     fn toward(&self) -> [f64; 4] {
@@ -404,7 +415,12 @@ impl Row {
     }
 
     /// Adds to a pose's information; the rows' own is diagonal where poses move.
-    fn add_to_pose(&self, a: &mut SMatrix<f64, 6, 6>, b: &mut Vector6<f64>, toward: &[f64; 4]) {
+    fn add_to_pose(
+        &self,
+        a: &mut SMatrix<f64, 6, 6>,
+        b: &mut Vector6<f64>,
+        toward: &[f64; 4],
+    ) {
         for r in 0..self.n {
             let w = self.information[r][r];
             if w == 0.0 {
@@ -438,7 +454,13 @@ impl Row {
 }
 
 /// Adds `w h^T m h` to the information of a pose.
-pub(super) fn add_pose_information(a: &mut Square6, h: &ByPose, m: &Square4, n: usize, w: f64) {
+pub(super) fn add_pose_information(
+    a: &mut Square6,
+    h: &ByPose,
+    m: &Square4,
+    n: usize,
+    w: f64,
+) {
     for r in 0..n {
         let mut left = [0.0; 6];
         for s in 0..n {
@@ -472,14 +494,15 @@ type Solution = (Vec<Vector4<f64>>, Vec<Vector6<f64>>, Option<Diagonals>);
 fn poses_kept(
     objects: Vec<ObjectBlock>,
     poses: Vec<PoseBlock>,
-    mut couplings: Vec<Coupling>,
+    couplings: &[Coupling],
     marginals: bool,
 ) -> Option<Solution> {
-    couplings.sort_by_key(|&(object, view, _)| (object, view));
     let arrow = Arrow {
         kept: poses,
         eliminated: objects,
-        couplings,
+        couplings: sorted(couplings, |c| (c.0, c.1))
+            .map(|c| (c.0, c.1, c.2))
+            .collect(),
     };
     let solved: Solved<6, 4> = arrow.solve()?;
     let diagonals = marginals.then(|| {
@@ -492,20 +515,31 @@ fn poses_kept(
 fn objects_kept(
     objects: Vec<ObjectBlock>,
     poses: Vec<PoseBlock>,
-    couplings: Vec<Coupling>,
+    couplings: &[Coupling],
     marginals: bool,
 ) -> Option<Solution> {
-    let mut turned: Vec<(usize, usize, SMatrix<f64, 6, 4>)> = couplings
-        .iter()
-        .map(|(object, view, block)| (*view, *object, block.transpose()))
-        .collect();
-    turned.sort_by_key(|&(view, object, _)| (view, object));
     let arrow = Arrow {
         kept: objects,
         eliminated: poses,
-        couplings: turned,
+        couplings: sorted(couplings, |c| (c.1, c.0))
+            .map(|c| (c.1, c.0, c.2.transpose()))
+            .collect(),
     };
     let solved: Solved<4, 6> = arrow.solve()?;
     let diagonals = marginals.then(|| solved.covariances());
     Some((solved.kept, solved.eliminated, diagonals))
+}
+
+/// Couplings in an order: numbers are sorted, for the blocks are heavy.
+fn sorted<'a>(
+    couplings: &'a [Coupling],
+    key: impl Fn(&Coupling) -> (usize, usize),
+) -> impl Iterator<Item = &'a Coupling> {
+    let mut order: Vec<((usize, usize), usize)> = couplings
+        .iter()
+        .enumerate()
+        .map(|(i, c)| (key(c), i))
+        .collect();
+    order.sort_unstable();
+    order.into_iter().map(|(_, i)| &couplings[i])
 }

@@ -1,0 +1,71 @@
+//! Poses as fusion corrected them.
+
+use nalgebra::Rotation3;
+
+use super::{Product, Scene};
+use crate::error::Error;
+use crate::frame::{Geodetic, RigidTransform};
+use crate::pose::{PoseRecord, Time, poses_text};
+use crate::view::View;
+
+/// How far a view's pose was corrected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Correction {
+    /// Of its position, metres.
+    pub(super) shift_m: f64,
+    /// Of its attitude, radians.
+    pub(super) turn: f64,
+}
+
+impl Scene<'_> {
+    /// How far the pose of a view was corrected; `None` where poses are as measured.
+    pub(super) fn correction(&self, view: usize) -> Option<Correction> {
+        let from = self.measured?.get(view)?.pose.enu_from_body;
+        let to = self.views[view].pose.enu_from_body;
+        let turn = from.rotation.inverse() * to.rotation;
+        Some(Correction {
+            shift_m: (to.translation - from.translation).norm(),
+            turn: Rotation3::from_matrix_unchecked(turn.matrix()).angle(),
+        })
+    }
+
+    /// `poses_corrected.csv`: the poses of all views as corrected, with their posterior standard
+    /// deviations; `None` where poses are as measured. Places are as the run's own pose logs have them:
+    /// latitude and longitude by the planet's convention, heights in the run's vertical datum. Headings
+    /// count from true north.
+    ///
+    /// # Errors
+    /// A place outside the grid of the run's vertical datum.
+    pub fn corrected_poses(&self) -> Result<Option<Product>, Error> {
+        if self.measured.is_none() {
+            return Ok(None);
+        }
+        let records: Result<Vec<PoseRecord>, Error> =
+            self.views.iter().map(|v| self.record(v)).collect();
+        let text = poses_text(&records?)?;
+        Ok(Some(Product::new("poses_corrected.csv", text)))
+    }
+
+    fn record(&self, view: &View) -> Result<PoseRecord, Error> {
+        let RigidTransform { rotation, .. } = view.pose.enu_from_body;
+        let place = self.site.geodetic(view.pose.enu_from_body.origin());
+        let height_m = self.height_m(place).ok_or_else(|| {
+            let id = &view.image_id;
+            Error::Output(format!(
+                "poses_corrected.csv: view {id} lies outside the grid of the run's vertical datum"
+            ))
+        })?;
+        let (lat_deg, lon_deg) = self.site.planet().lat_lon_deg(place);
+        let epoch = Time::parse("0");
+        Ok(PoseRecord {
+            image_id: Some(view.image_id.clone()),
+            camera: view.camera_name().map(str::to_owned),
+            path: None,
+            platform: view.platform.clone(),
+            time_s: view.time.zip(epoch).map(|(t, zero)| t.seconds_since(zero)),
+            place: Geodetic::from_degrees(lat_deg, lon_deg, height_m),
+            attitude: self.site.enu_from_local(place).inverse() * rotation,
+            sigma: Some(view.pose.sigma),
+        })
+    }
+}
