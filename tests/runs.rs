@@ -357,7 +357,10 @@ fn parked_cars_from_a_vehicle() {
     run.is_accounted_for();
     assert_eq!(run.summary.n_views, 447);
     assert_eq!(run.summary.n_annotated, 3);
-    assert!(run.summary.n_placed > 2000 && run.summary.n_objects.unwrap() > 80);
+    assert!(run.summary.n_placed > 2000);
+    // 80 cars are labelled.
+    let n_objects = run.summary.n_objects.unwrap();
+    assert!((60..=90).contains(&n_objects), "{n_objects}");
 }
 
 #[test]

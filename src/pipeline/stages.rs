@@ -10,6 +10,7 @@ use super::read::Inputs;
 use super::summary::Stage;
 use crate::error::Error;
 use crate::footprint::{Footprints, Reach, trace};
+use crate::fuse::belief::PoseCorrection;
 use crate::input::Reject;
 use crate::project::{self, MarkNoise, Placed};
 use crate::publish::Scene;
@@ -35,12 +36,14 @@ pub struct Ground {
 impl Ground {
     /// The run as publishing takes it.
     pub fn scene<'a>(&'a self, config: &Config, inputs: &'a Inputs) -> Scene<'a> {
+        let corrects = config.fusion.pose_correction != PoseCorrection::Off;
+        let corrected = self.corrected.as_ref().filter(|_| corrects);
         Scene {
             site: &inputs.site,
             datum: inputs.datum.as_ref(),
             terrain: inputs.terrain.as_ref(),
             views: self.corrected.as_deref().unwrap_or(&inputs.views),
-            measured: self.corrected.as_ref().map(|_| inputs.views.as_slice()),
+            measured: corrected.map(|_| inputs.views.as_slice()),
             detections: &inputs.detections,
             placed: &self.placed,
             footprints: &self.footprints,

@@ -1,7 +1,5 @@
 //! Poses as fusion corrected them.
 
-use nalgebra::Rotation3;
-
 use super::{Product, Scene};
 use crate::error::Error;
 use crate::frame::{Geodetic, RigidTransform};
@@ -25,7 +23,8 @@ impl Scene<'_> {
         let turn = from.rotation.inverse() * to.rotation;
         Some(Correction {
             shift_m: (to.translation - from.translation).norm(),
-            turn: Rotation3::from_matrix_unchecked(turn.matrix()).angle(),
+            // By the quaternion: the matrix of a small turn has no digits of its angle.
+            turn: turn.quaternion().angle(),
         })
     }
 

@@ -1,0 +1,107 @@
+//! `[fusion]`: the method.
+
+use serde::Serialize;
+
+use super::{POSITIVE, not_negative, positive};
+use crate::fuse::belief::{PoseCorrection, SizeRule};
+use crate::input::Section;
+
+/// `[fusion]`: the method.
+#[derive(Debug, Clone, Serialize)]
+pub struct FusionConfig {
+    /// The method.
+    pub method: Method,
+    /// `em`, `paper`: the one width of the Gaussians, metres.
+    pub width_m: f64,
+    /// `em`, `paper`: clusters of no more total membership are not reported.
+    pub min_weight: f64,
+    /// `belief`: how poses are corrected.
+    pub pose_correction: PoseCorrection,
+    /// `belief`: which side of a box says how large an object is.
+    pub size_from: SizeRule,
+    /// `belief`: standard deviation of the logarithm of an apparent size.
+    pub log_size_sigma: f64,
+    /// `belief`: where on an object a box sits, as a share of its size.
+    pub shape: f64,
+    /// `belief`: how far an object's middle lies behind its marked face, metres.
+    pub radius_m: f64,
+    /// `belief`: mean and standard deviation of the objects' sizes, metres.
+    pub size_m: Option<(f64, f64)>,
+    /// `belief`: errors of looks at one object fade in this time, seconds.
+    pub geometry_time_s: f64,
+    /// `belief`: whether an object is detected depends on the last look for this time, seconds.
+    pub event_time_s: f64,
+}
+
+/// A fusion method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Standard EM, without any view constraint.
+    Em,
+    /// Multiple-view EM (Thompson & Wettergreen 2005).
+    Paper,
+    /// Exclusive association by belief propagation, with evidence for and against every object and
+    /// correction of the poses.
+    Belief,
+}
+
+impl Method {
+    /// All methods there are.
+    pub const ALL: [Self; 3] = [Self::Em, Self::Paper, Self::Belief];
+
+    /// Its name in pipeline files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Em => "em",
+            Self::Paper => "paper",
+            Self::Belief => "belief",
+        }
+    }
+}
+
+pub(super) fn fusion(section: Section<'_>) -> Option<FusionConfig> {
+    let method = match section
+        .word("method", &["em", "paper", "belief"])
+        .as_deref()
+    {
+        Some("em") => Some(Method::Em),
+        Some("belief") => Some(Method::Belief),
+        _ => Some(Method::Paper),
+    };
+    let words = ["off", "per-view", "drift"];
+    let config = method.map(|method: Method| FusionConfig {
+        method,
+        width_m: positive(&section, "width_m", 0.2),
+        min_weight: not_negative(&section, "min_weight", 1.5),
+        pose_correction: match section.word("pose_correction", &words).as_deref() {
+            Some("off") => PoseCorrection::Off,
+            Some("drift") => PoseCorrection::Drift,
+            _ => PoseCorrection::PerView,
+        },
+        size_from: match section.word("size_from", &["width", "height"]).as_deref() {
+            Some("height") => SizeRule::Height,
+            _ => SizeRule::Width,
+        },
+        log_size_sigma: positive(&section, "log_size_sigma", 0.15),
+        shape: not_negative(&section, "shape", 0.0),
+        radius_m: not_negative(&section, "radius_m", 0.0),
+        size_m: size_m(&section),
+        geometry_time_s: positive(&section, "geometry_time_s", 1.5),
+        event_time_s: positive(&section, "event_time_s", 0.5),
+    });
+    section.finish();
+    config
+}
+
+/// The sizes of the objects, where the run knows them: their standard deviation is a tenth of the
+/// mean unless it is stated.
+fn size_m(section: &Section<'_>) -> Option<(f64, f64)> {
+    let mean = section.number("size_m", f64::MIN_POSITIVE.., POSITIVE);
+    let sigma = section.number("size_sigma_m", f64::MIN_POSITIVE.., POSITIVE);
+    if let (None, Some(sigma)) = (mean, sigma) {
+        let expected = "no such key without size_m, the mean that it is about";
+        section.fault("size_sigma_m", sigma, expected);
+    }
+    mean.map(|mean| (mean, sigma.unwrap_or(0.1 * mean)))
+}

@@ -1,0 +1,49 @@
+//! `[output]`: what is written, and where.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::super::formats::formats;
+use super::Overrides;
+use crate::input::Section;
+use crate::publish::Format;
+
+/// `[output]`: what is written, and where.
+#[derive(Debug, Clone, Serialize)]
+pub struct OutputConfig {
+    /// `belief`: candidates of less existence probability are not written.
+    pub min_exist: f64,
+    /// The folder. Not part of what the run is, so no output names it.
+    #[serde(skip)]
+    pub dir: PathBuf,
+    /// Map formats.
+    pub formats: Vec<Format>,
+    /// Whether pictures are annotated.
+    pub annotate: bool,
+    /// Whether every detection is written by itself too.
+    pub detections: bool,
+}
+
+pub(super) fn output(
+    section: Section<'_>,
+    path: &Path,
+    overrides: &Overrides,
+) -> Option<OutputConfig> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let stem = path.file_stem().unwrap_or_default();
+    let written = section.text("dir").map(|dir| folder.join(dir));
+    let dir = written.unwrap_or_else(|| folder.join("../outputs").join(stem));
+    let formats = formats(&section);
+    let config = OutputConfig {
+        min_exist: section
+            .number("min_exist", 0.0..=1.0, "0 to 1")
+            .unwrap_or(0.05),
+        dir: overrides.out.clone().unwrap_or(dir),
+        formats: formats.clone().unwrap_or_default(),
+        annotate: section.boolean("annotate").unwrap_or(true),
+        detections: section.boolean("detections").unwrap_or(false),
+    };
+    section.finish();
+    formats.map(|_| config)
+}
