@@ -1,8 +1,10 @@
 //! What other programs call a coordinate reference system, by PROJ's database.
 
-use proj::Proj;
+use proj::wkt::WktVersion;
+use proj::{Proj, ProjError};
 
-use super::CrsError;
+use super::definition::Definition;
+use super::{CrsError, Ellipsoid, Planet};
 
 /// A coordinate reference system in the words of files.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,64 +17,104 @@ pub struct CrsText {
     pub name: String,
     /// Well-known text 2 (ISO 19162:2019), on one line.
     pub wkt2: String,
+    /// Well-known text 2 as OGC 12-063r5 has it, on one line.
+    pub wkt2_2015: String,
+    ellipsoid: Option<Ellipsoid>,
     /// PROJJSON.
     pub projjson: serde_json::Value,
 }
 
 impl CrsText {
-    /// Well-known text 1 (OGC 01-009), on one line, of a geographic one; `None` of others.
+    /// The words for `AUTHORITY:CODE` or a PROJ string.
+    ///
+    /// # Errors
+    /// [`CrsError::Unknown`] where PROJ does not know it.
+    pub fn of(definition: &str) -> Result<Self, CrsError> {
+        let (authority, code) = definition
+            .split_once(':')
+            .and_then(|(authority, code)| Some((authority.to_owned(), code.parse().ok()?)))
+            .unwrap_or_default();
+        let text = Self::without_code(definition)?;
+        Ok(Self {
+            authority,
+            code,
+            ..text
+        })
+    }
+
+    /// The words for the system that a planet's map is written in: the planet's own, but with longitudes
+    /// that grow eastwards, which programs expect whatever the axis says; then it has no code.
+    ///
+    /// # Errors
+    /// [`CrsError::Unknown`] where PROJ does not know it.
+    pub fn of_map(planet: Planet) -> Result<Self, CrsError> {
+        if planet.eastward() == planet {
+            return Self::of(planet.crs);
+        }
+        let mut crs = Definition::of(planet.crs)?.into_json();
+        let name = crs["name"].as_str().unwrap_or(planet.crs);
+        crs["name"] = format!("{name}, east positive").into();
+        if let Some(axes) = crs["coordinate_system"]["axis"].as_array_mut() {
+            for axis in axes.iter_mut().filter(|axis| axis["direction"] == "west") {
+                axis["direction"] = "east".into();
+            }
+        }
+        if let Some(crs) = crs.as_object_mut() {
+            crs.shift_remove("id");
+        }
+        Self::without_code(&crs.to_string())
+    }
+
+    fn without_code(definition: &str) -> Result<Self, CrsError> {
+        let unknown = |error: ProjError| CrsError::Unknown {
+            found: definition.to_owned(),
+            why: error.to_string(),
+        };
+        let parts = Definition::of(definition)?;
+        let ellipsoid = parts.ellipsoid();
+        let crs = Proj::new(definition).map_err(|error| CrsError::Unknown {
+            found: definition.to_owned(),
+            why: error.to_string(),
+        })?;
+        // Without a version PROJ writes the newest it knows, WKT2:2019.
+        let wkt2 = crs.as_wkt(None, None).map_err(unknown)?;
+        let wkt2_2015 = crs.as_wkt(Some(WktVersion::Wkt2_2015), None);
+        let projjson = parts.into_json();
+        Ok(Self {
+            authority: String::new(),
+            code: 0,
+            name: projjson["name"].as_str().unwrap_or(definition).to_owned(),
+            wkt2: one_line(&wkt2),
+            wkt2_2015: one_line(&wkt2_2015.map_err(unknown)?),
+            ellipsoid,
+            projjson,
+        })
+    }
+
+    /// Well-known text 1 (OGC 01-009), on one line, of a geographic one; `None` of others, and of
+    /// planetocentric latitudes on an ellipsoid, which it has no words for.
     pub fn geographic_wkt1(&self) -> Option<String> {
         let crs = &self.projjson;
         if crs["type"] != "GeographicCRS" {
             return None;
         }
         let datum = crs.get("datum").or_else(|| crs.get("datum_ensemble"))?;
-        let ellipsoid = &datum["ellipsoid"];
-        let radius = ellipsoid
-            .get("radius")
-            .or(ellipsoid.get("semi_major_axis"))?;
-        let flattening = ellipsoid.get("inverse_flattening");
-        let flattening = flattening.map_or("0".to_owned(), ToString::to_string);
+        let Ellipsoid { a, f } = self.ellipsoid?;
+        let flattening = if f == 0.0 { 0.0 } else { 1.0 / f };
         let meridian = &datum["prime_meridian"]["name"];
+        let authority = if self.code > 0 {
+            format!(",AUTHORITY[\"{}\",\"{}\"]", self.authority, self.code)
+        } else {
+            String::new()
+        };
         Some(format!(
-            "GEOGCS[{},DATUM[{},SPHEROID[{},{radius},{flattening}]],PRIMEM[\"{}\",0],\
-             UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"{}\",\"{}\"]]",
+            "GEOGCS[{},DATUM[{},SPHEROID[{},{a},{flattening}]],PRIMEM[\"{}\",0],\
+             UNIT[\"degree\",0.0174532925199433]{authority}]",
             crs["name"],
             datum["name"],
-            ellipsoid["name"],
-            meridian.as_str().unwrap_or("Greenwich"),
-            self.authority,
-            self.code
+            datum["ellipsoid"]["name"],
+            meridian.as_str().unwrap_or("Reference Meridian"),
         ))
-    }
-
-    /// The words for `AUTHORITY:CODE` or a PROJ string.
-    ///
-    /// # Errors
-    /// [`CrsError::Unknown`] where PROJ does not know it.
-    pub fn of(definition: &str) -> Result<Self, CrsError> {
-        let unknown = |why: String| CrsError::Unknown {
-            found: definition.to_owned(),
-            why,
-        };
-        let crs = Proj::new(definition).map_err(|e| unknown(e.to_string()))?;
-        // Without a version PROJ writes the newest it knows, WKT2:2019.
-        let wkt2 = crs.as_wkt(None, None).map_err(|e| unknown(e.to_string()))?;
-        let json = crs.to_projjson(Some(false), None, None);
-        let json = json.map_err(|e| unknown(e.to_string()))?;
-        let projjson: serde_json::Value =
-            serde_json::from_str(&json).map_err(|e| unknown(e.to_string()))?;
-        let (authority, code) = definition
-            .split_once(':')
-            .and_then(|(authority, code)| Some((authority.to_owned(), code.parse().ok()?)))
-            .unwrap_or_default();
-        Ok(Self {
-            authority,
-            code,
-            name: projjson["name"].as_str().unwrap_or(definition).to_owned(),
-            wkt2: one_line(&wkt2),
-            projjson,
-        })
     }
 }
 
@@ -109,5 +151,29 @@ mod tests {
         assert!(text.wkt2.starts_with("PROJCRS["), "{}", text.wkt2);
         assert_eq!(text.geographic_wkt1(), None);
         assert!(CrsText::of("EPSG:999999").is_err());
+    }
+
+    /// Longitudes of a map grow eastwards, and its system says so.
+    #[test]
+    fn westward_longitudes_are_turned() {
+        let planet = Planet::named("IAU_2015:49901").unwrap();
+        let text = CrsText::of_map(planet).unwrap();
+        assert_eq!((text.authority.as_str(), text.code), ("", 0));
+        assert_eq!(text.name, "Mars (2015) / Ographic, east positive");
+        assert!(text.wkt2.contains(",east,") && !text.wkt2.contains(",west,"));
+        assert!(!text.wkt2.contains("49901") && text.projjson.get("id").is_none());
+        let wkt1 = text.geographic_wkt1().unwrap();
+        assert!(wkt1.contains("3396190,169.8944472236"), "{wkt1}");
+        assert!(!wkt1.contains("AUTHORITY"));
+        let mars = CrsText::of_map(Planet::MARS).unwrap();
+        assert_eq!(mars, CrsText::of("IAU_2015:49900").unwrap());
+    }
+
+    #[test]
+    fn planetocentric_latitudes_on_an_ellipsoid_have_well_known_text_2_only() {
+        let text = CrsText::of("IAU_2015:49902").unwrap();
+        assert_eq!(text.geographic_wkt1(), None);
+        assert!(text.wkt2_2015.starts_with("GEODCRS["), "{}", text.wkt2_2015);
+        assert!(text.wkt2_2015.contains("spherical"));
     }
 }

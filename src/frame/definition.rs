@@ -35,6 +35,11 @@ impl Definition {
         Ok(Self { root })
     }
 
+    /// As PROJJSON.
+    pub fn into_json(self) -> Value {
+        self.root
+    }
+
     /// Its horizontal part: itself, or the first of a compound one.
     fn horizontal(&self) -> &Value {
         let mut part = &self.root;

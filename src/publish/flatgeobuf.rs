@@ -15,7 +15,7 @@ use crate::frame::CrsText;
 /// What the encoder says.
 pub fn bytes(layer: &Layer) -> Result<Vec<u8>, Error> {
     let failed = |why: String| Error::Output(format!("cannot write {}.fgb: {why}", layer.name));
-    let crs = CrsText::of(layer.planet.crs).map_err(|e| failed(e.to_string()))?;
+    let crs = CrsText::of_map(layer.planet).map_err(|e| failed(e.to_string()))?;
     write(layer, &crs).map_err(|e| failed(e.to_string()))
 }
 
@@ -32,7 +32,7 @@ fn write(layer: &Layer, crs: &CrsText) -> Result<Vec<u8>, Box<dyn std::error::Er
         detect_type: false,
         promote_to_multi: false,
         crs: FgbCrs {
-            org: Some(&crs.authority),
+            org: (crs.code > 0).then_some(crs.authority.as_str()),
             code: crs.code,
             name: Some(&crs.name),
             wkt: Some(&crs.wkt2),

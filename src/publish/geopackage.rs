@@ -12,11 +12,14 @@ use super::layer::{Feature, FieldKind, Geometry, Kind, Layer, Value};
 use super::qgis;
 use super::wkt;
 use crate::error::Error;
-use crate::frame::CrsText;
+use crate::frame::{CrsText, Planet};
 use crate::pose::Time;
 
 /// The column of geometries.
 const GEOMETRY: &str = "geom";
+
+/// The number of a system without a code.
+const OWN_CODE: i32 = 100_000;
 
 /// When the contents last changed, where no layer knows a time.
 const EPOCH: &str = "1970-01-01T00:00:00.000Z";
@@ -33,12 +36,9 @@ fn write(layers: &[Layer]) -> Result<Vec<u8>, Box<dyn std::error::Error>> {
     let mut db = Connection::open_in_memory()?;
     db.execute_batch(schema::BASE)?;
     let transaction = db.transaction()?;
-    for planet in layers.iter().map(|l| l.planet.crs) {
-        add_crs(&transaction, &CrsText::of(planet)?)?;
-    }
     let changed = last_change(layers);
     for layer in layers {
-        let srs_id = CrsText::of(layer.planet.crs)?.code;
+        let srs_id = add_crs(&transaction, layer.planet)?;
         add_layer(&transaction, layer, srs_id, &changed)?;
     }
     add_styles(&transaction, layers, &changed)?;
@@ -48,11 +48,32 @@ fn write(layers: &[Layer]) -> Result<Vec<u8>, Box<dyn std::error::Error>> {
     Ok(db.serialize(MAIN_DB)?.to_vec())
 }
 
-fn add_crs(db: &Connection, crs: &CrsText) -> rusqlite::Result<()> {
+/// Enters the system of a planet's map; gives the number it goes by in the file.
+fn add_crs(db: &Connection, planet: Planet) -> Result<i32, Box<dyn std::error::Error>> {
+    let crs = CrsText::of_map(planet)?;
+    let (authority, code) = if crs.code > 0 {
+        (crs.authority.as_str(), crs.code)
+    } else {
+        ("NONE", OWN_CODE)
+    };
+    let wkt1 = crs.geographic_wkt1();
+    let has_wkt1 = wkt1.is_some();
+    let definition = wkt1.unwrap_or("undefined".to_owned());
     let sql = "INSERT OR IGNORE INTO gpkg_spatial_ref_sys VALUES (?, ?, ?, ?, ?, NULL)";
-    let wkt1 = crs.geographic_wkt1().unwrap_or("undefined".to_owned());
-    let row = params![crs.name, crs.code, crs.authority, crs.code, wkt1];
-    db.execute(sql, row).map(drop)
+    let row = params![crs.name, code, authority, code, definition];
+    if has_wkt1 {
+        db.execute(sql, row)?;
+        return Ok(code);
+    }
+    let is_known = "SELECT count(*) FROM gpkg_spatial_ref_sys WHERE srs_id = ?";
+    let known: i64 = db.query_row(is_known, params![code], |row| row.get(0))?;
+    if known == 0 {
+        db.execute(sql, row)?;
+        db.execute_batch(schema::WKT2)?;
+        let sql = "UPDATE gpkg_spatial_ref_sys SET definition_12_063 = ? WHERE srs_id = ?";
+        db.execute(sql, params![crs.wkt2_2015, code])?;
+    }
+    Ok(code)
 }
 
 fn add_layer(db: &Connection, layer: &Layer, srs_id: i32, changed: &str) -> rusqlite::Result<()> {

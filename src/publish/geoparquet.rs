@@ -31,7 +31,7 @@ pub fn bytes(layer: &Layer) -> Result<Vec<u8>, Error> {
     if let Some(kind) = layer.geometry {
         columns.push(geometries(layer));
         columns.extend(boxes(layer));
-        let crs = CrsText::of(layer.planet.crs)
+        let crs = CrsText::of_map(layer.planet)
             .map_err(|e| Error::Output(format!("cannot write {}.parquet: {e}", layer.name)))?;
         metadata.push(("geo", geo_metadata(layer, kind, crs.projjson).to_string()));
     }

@@ -5,7 +5,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::format::Format;
 use super::layer::{Geometry, Layer, Value, union};
-use crate::frame::Planet;
+use crate::frame::{CrsText, Planet};
 use crate::pose::Time;
 
 /// What an item says.
@@ -75,12 +75,18 @@ pub fn text(item: &Item<'_>) -> Option<String> {
     properties.insert("start_datetime".to_owned(), json!(start.to_string()));
     properties.insert("end_datetime".to_owned(), json!(end.to_string()));
     let mut extensions = vec!["https://stac-extensions.github.io/projection/v2.0.0/schema.json"];
-    properties.insert("proj:code".to_owned(), json!(item.planet.crs));
+    let crs = CrsText::of_map(item.planet).ok()?;
+    if crs.code > 0 {
+        properties.insert("proj:code".to_owned(), json!(item.planet.crs));
+    } else {
+        properties.insert("proj:code".to_owned(), Json::Null);
+        properties.insert("proj:projjson".to_owned(), crs.projjson);
+    }
     if !item.planet.is_earth() {
         extensions.push("https://stac-extensions.github.io/ssys/v1.1.0/schema.json");
-        let mut name = item.planet.name.to_owned();
-        name[..1].make_ascii_uppercase();
-        properties.insert("ssys:targets".to_owned(), json!([name]));
+        // Systems of the IAU are called after their body: "Europa (2015) - Sphere / Ocentric".
+        let body = crs.name.split(" (").next();
+        properties.insert("ssys:targets".to_owned(), json!([body]));
     }
     let assets = item.assets.iter().map(|asset| {
         let about = json!({

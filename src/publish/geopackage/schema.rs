@@ -51,6 +51,14 @@ INSERT INTO gpkg_spatial_ref_sys VALUES
    'longitude/latitude coordinates in decimal degrees on the WGS 84 spheroid');
 "#;
 
+/// Room for well-known text 2, where a system has no well-known text 1.
+pub(super) const WKT2: &str = r"
+ALTER TABLE gpkg_spatial_ref_sys ADD COLUMN definition_12_063 TEXT NOT NULL DEFAULT 'undefined';
+INSERT INTO gpkg_extensions VALUES
+  ('gpkg_spatial_ref_sys', 'definition_12_063', 'gpkg_crs_wkt',
+   'http://www.geopackage.org/spec130/#extension_crs_wkt', 'read-write');
+";
+
 /// The table of styles, as QGIS makes it.
 pub(super) const STYLES: &str = r#"
 CREATE TABLE layer_styles (

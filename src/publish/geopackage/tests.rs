@@ -215,6 +215,43 @@ fn other_planets_have_their_own_system() {
     }
 }
 
+/// Westward longitudes are written eastwards, in a system that says so; planetocentric latitudes on an
+/// ellipsoid, which well-known text 1 has no words for, take the extension for well-known text 2.
+#[test]
+fn systems_that_are_no_plain_latitude_and_longitude() {
+    let system = |name: &str, columns: &str| {
+        let planet = Planet::named(name).unwrap();
+        let (_file, db) = opened(&bytes(&layers(planet)).unwrap());
+        assert_eq!(
+            rows(&db, "PRAGMA foreign_key_check"),
+            Vec::<Vec<Sql>>::new()
+        );
+        rows(
+            &db,
+            &format!(
+                "SELECT {columns} FROM gpkg_geometry_columns NATURAL JOIN gpkg_spatial_ref_sys \
+                 WHERE table_name = 'rocks'"
+            ),
+        )
+        .remove(0)
+    };
+    let ographic = system("IAU_2015:49901", "srs_id, organization, definition");
+    assert_eq!(ographic[..2], [Sql::Integer(100_000), text("NONE")]);
+    let Sql::Text(wkt) = &ographic[2] else {
+        panic!("{ographic:?}");
+    };
+    assert!(wkt.contains("3396190,169.89444722361"), "{wkt}");
+    let ocentric = system("IAU_2015:49902", "srs_id, definition, definition_12_063");
+    assert_eq!(ocentric[..2], [Sql::Integer(49902), text("undefined")]);
+    let Sql::Text(wkt) = &ocentric[2] else {
+        panic!("{ocentric:?}");
+    };
+    assert!(
+        wkt.starts_with("GEODCRS[\"Mars (2015) / Ocentric\""),
+        "{wkt}"
+    );
+}
+
 #[test]
 fn nothing_still_has_tables_and_the_same_bytes_come_twice() {
     let mut empty = layers(Planet::EARTH);

@@ -66,7 +66,7 @@ fn packed(text: &str) -> Result<Vec<u8>, zip::result::ZipError> {
 
 fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
     let planet = project.site.planet();
-    let geographic = CrsText::of(planet.crs)?;
+    let geographic = CrsText::of_map(planet)?;
     let definition = local_crs(project.site);
     let mut local = CrsText::of(&definition)?;
     if local.code == 0 {
