@@ -14,6 +14,9 @@ pub(crate) struct Arrow<const A: usize, const B: usize> {
     pub(crate) eliminated: Vec<(SMatrix<f64, B, B>, SVector<f64, B>)>,
     /// Couplings: of an eliminated with a kept unknown, sorted by the former.
     pub(crate) couplings: Vec<(usize, usize, SMatrix<f64, B, A>)>,
+    /// Kept unknowns coupled with an earlier one: the later, the earlier, and the block in the later's
+    /// rows.
+    pub(crate) links: Vec<(usize, usize, SMatrix<f64, A, A>)>,
 }
 
 /// A solved system.
@@ -42,6 +45,9 @@ impl<const A: usize, const B: usize> Arrow<A, B> {
         for (i, (block, side)) in self.kept.iter().enumerate() {
             add_block(&mut matrix, i, i, block);
             right.extend(side.iter());
+        }
+        for (later, earlier, block) in &self.links {
+            add_block(&mut matrix, *later, *earlier, block);
         }
         for group in by_eliminated(&self.couplings) {
             let j = group[0].0;
@@ -88,6 +94,9 @@ impl<const A: usize, const B: usize> Arrow<A, B> {
             for (_, a, _) in group {
                 first[*a] = first[*a].min(lowest);
             }
+        }
+        for (later, earlier, _) in &self.links {
+            first[*later] = first[*later].min(*earlier);
         }
         first.iter().flat_map(|f| [A * f; A]).collect()
     }
@@ -201,6 +210,7 @@ mod tests {
                 })
                 .collect(),
             couplings,
+            links: Vec::new(),
         };
         let solved = arrow.solve().unwrap();
         let inverse = whole.try_inverse().unwrap();

@@ -323,6 +323,7 @@ impl Normal {
                 kept: self.points,
                 eliminated: self.poses,
                 couplings,
+                links: Vec::new(),
             };
             let solved: Solved<3, 6> = arrow.solve()?;
             let diagonals = covariances.then(|| solved.covariances());
@@ -334,6 +335,7 @@ impl Normal {
             kept: self.poses,
             eliminated: self.points,
             couplings,
+            links: Vec::new(),
         };
         let solved: Solved<6, 3> = arrow.solve()?;
         let diagonals = covariances.then(|| {

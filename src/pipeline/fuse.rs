@@ -9,7 +9,7 @@ use super::stages::{self, Clock, Ground};
 use crate::adjust::{Measurement, Problem, Surface};
 use crate::error::Error;
 use crate::frame::{RigidTransform, Vector};
-use crate::fuse::belief::{Belief, BeliefSettings, fuse_belief};
+use crate::fuse::belief::{Belief, BeliefSettings, Drift, fuse_belief};
 use crate::fuse::{
     Fusion, MixtureSettings, Object, Observation, Weights, fuse_mixture,
 };
@@ -128,6 +128,11 @@ fn settings(config: &Config) -> BeliefSettings {
     let f = &config.fusion;
     BeliefSettings {
         pose_correction: f.pose_correction,
+        drift: Drift {
+            share: f.drift_share,
+            length_m: f.drift_length_m,
+        },
+        scores: f.scores,
         size_rule: f.size_from,
         log_size_sigma: f.log_size_sigma,
         shape: f.shape,

@@ -207,7 +207,7 @@ fn look(index: usize, m: &Measurement, view: usize, settings: &BeliefSettings) -
         log_px,
         is_cut: m.is_cut,
         class: m.class,
-        logit: m.score.map(logit),
+        logit: m.score.filter(|_| settings.scores).map(logit),
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::algebra::{Square4, Square6, inverse6};
+use super::algebra::{Square4, Square6};
 use super::curve::Detectability;
 use super::data::{Look, Platform, PoseNow, looks, order, platforms};
 use super::expect::{Expected, expect};
@@ -123,6 +123,9 @@ pub(super) struct Engine<'a> {
     pub(super) platforms: Vec<Platform>,
     pub(super) poses: Vec<PoseNow>,
     pub(super) delta: Vec<[f64; 6]>,
+    /// What of them drifts, and whose views have been taken in.
+    pub(super) drift: Vec<[f64; 6]>,
+    pub(super) is_settled: Vec<bool>,
     /// Conditional covariances of the pose errors.
     pub(super) pose_cov: Vec<Square6>,
     pub(super) looks: Vec<Look>,
@@ -190,6 +193,8 @@ impl<'a> Engine<'a> {
             platforms,
             poses,
             delta,
+            drift: vec![[0.0; 6]; n],
+            is_settled: vec![false; n],
             pose_cov,
             looks,
             singles: Vec::new(),
@@ -261,7 +266,9 @@ impl<'a> Engine<'a> {
     /// Its inverse: a diagonal.
     pub(super) fn pose_information(&self, view: usize) -> [f64; 6] {
         let sigma = &self.platforms[view].sigma;
-        std::array::from_fn(|i| (sigma[i] * self.model.pose_scale[i]).powi(-2))
+        // Given its drift, a pose has only its jitter left.
+        let share = self.drift_law().map_or(1.0, |d| (1.0 - d.share).max(1e-3));
+        std::array::from_fn(|i| (sigma[i] * self.model.pose_scale[i]).powi(-2) / share)
     }
 
     /// Where an object's detectability is read off the curve.

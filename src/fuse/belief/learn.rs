@@ -67,7 +67,10 @@ impl Engine<'_> {
         let real: Vec<f64> = evidence.log_odds.iter().map(|&l| probability(l)).collect();
         let support = self.support();
         self.learn_noise(&real, &support);
-        if self.corrects_poses() && self.n_views() >= LEAST_VIEWS {
+        // A drift that all views share shows in none of their differences, so that its scatter would be
+        // taken for less than it is.
+        let drifts = self.drift_law().is_some();
+        if self.corrects_poses() && !drifts && self.n_views() >= LEAST_VIEWS {
             self.learn_pose_noise();
         }
         self.learn_heights(&real, &support);
@@ -315,9 +318,4 @@ impl Engine<'_> {
         curve.learn(chances);
         self.model.curve = curve;
     }
-}
-
-/// Experiments.
-pub(super) fn knob(i: usize, default: f64) -> f64 {
-    std::env::var(format!("KNOB{i}")).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }

@@ -2,6 +2,7 @@
 mod algebra;
 mod curve;
 mod data;
+mod drift;
 mod engine;
 mod evidence;
 mod expect;
@@ -20,6 +21,7 @@ mod single;
 mod associate;
 mod solve;
 
+pub use drift::Drift;
 pub use outcome::{fuse_belief, Belief, BeliefObject, BeliefEvidence, Single};
 
 /// How poses are corrected.
@@ -49,6 +51,10 @@ pub enum SizeRule {
 pub struct BeliefSettings {
     /// How poses are corrected.
     pub pose_correction: PoseCorrection,
+    /// How pose errors drift, where [`PoseCorrection::Drift`] asks for it.
+    pub drift: Drift,
+    /// Whether the detector's scores count.
+    pub scores: bool,
     /// Which side of a box says how large an object is.
     pub size_rule: SizeRule,
     /// Standard deviation of the logarithm of an apparent size.
@@ -73,6 +79,11 @@ impl Default for BeliefSettings {
     fn default() -> Self {
         Self {
             pose_correction: PoseCorrection::PerView,
+            drift: Drift {
+                share: 0.8,
+                length_m: 16.0,
+            },
+            scores: true,
             size_rule: SizeRule::Width,
             log_size_sigma: 0.15,
             shape: 0.0,

@@ -254,15 +254,6 @@ impl Engine<'_> {
         let stepped = self.adjust(3, Robust::Contaminated, true);
         self.weigh_background();
         let evidence = self.weigh(self.expectation());
-        if std::env::var("DEBUGL").is_ok() {
-            for k in 0..self.objects.len() {
-                let (mut hw, mut hn) = (0.0, 0.0);
-                for (e, w) in self.edges.iter().zip(&evidence.edge_worth) { if e.object == k { hw += w * e.weight; hn += e.weight; } }
-                let (mut mw, mut mn, mut ml) = (0.0, 0.0, 0.0);
-                for ((p, q), w) in evidence.expectation.pairs.iter().zip(&evidence.detected).zip(&evidence.worth) { if p.object == k { mw += w * (1.0 - q); mn += 1.0 - q; ml += w * (1.0 - q) * (-p.p_detect).ln_1p(); } }
-                eprintln!("{k} L {:.1} hits {hn:.1} worth {hw:.1} misses {mn:.1} worth {mw:.1} ln {ml:.1} x {:?}", evidence.log_odds[k], self.objects[k]);
-            }
-        }
         let log_odds = evidence.final_log_odds();
         let (cov, pose_cov) = stepped
             .and_then(|s| s.marginal)

@@ -19,6 +19,8 @@ const MARGIN: f64 = 3.0;
 const WINDOW: usize = 24;
 /// Squared scales of the robust steps after each view.
 const SCHEDULE: [f64; 3] = [100.0, 25.0, 9.0];
+/// Objects are taken to exist with no more than this probability.
+const MOST_LIKELY: f64 = 0.9;
 /// A detection joins an object if it belongs to the known ones at all ...
 const JOINS: f64 = 0.5;
 /// ... and to this one with at least this membership.
@@ -70,14 +72,21 @@ impl Engine<'_> {
         };
         let mut exclusive = Exclusive::new();
         for (at, &view) in order.iter().enumerate() {
+            let before = at.checked_sub(1).map(|i| order[i]);
+            if self.drift_law().is_some() {
+                let (mean, _) = self.drift_from(before, view);
+                self.drift[view] = mean;
+                self.set_delta(view, mean);
+            }
             if !map.objects.is_empty() && !self.looks_of(view).is_empty() {
-                self.take_in(view, &mut map, &mut exclusive);
+                self.take_in(view, before, &mut map, &mut exclusive);
             }
             self.found_new(view, &mut map);
             let window = &order[(at + 1).saturating_sub(WINDOW)..=at];
             if at >= WINDOW {
                 self.fold(order[at - WINDOW], &mut map);
             }
+            self.is_settled[view] = true;
             self.settle_window(view, window, &mut map);
         }
         self.edges = map
@@ -98,7 +107,13 @@ impl Engine<'_> {
     }
 
     /// Registers a view, and gives its detections to the objects they are of.
-    fn take_in(&mut self, view: usize, map: &mut Growing, exclusive: &mut Exclusive) {
+    fn take_in(
+        &mut self,
+        view: usize,
+        before: Option<usize>,
+        map: &mut Growing,
+        exclusive: &mut Exclusive,
+    ) {
         let among = Candidates {
             objects: &map.objects,
             cov: &map.cov,
@@ -107,7 +122,11 @@ impl Engine<'_> {
             near: &map.near,
         };
         if self.corrects_poses() {
-            let stated = self.pose_prior(view);
+            let mut stated = [[0.0; 6]; 6];
+            let (_, variance) = self.drift_from(before, view);
+            for (i, v) in variance.iter().enumerate() {
+                stated[i][i] = *v;
+            }
             let mut best: Option<Registered> = None;
             for scale in SCALES {
                 let prior = stated.map(|row| row.map(|x| x * scale * scale));
@@ -153,7 +172,9 @@ impl Engine<'_> {
             if !taken.contains(&k) {
                 map.log_odds[k] += map.news(self, k, view) * (-pair.pair.p_detect).ln_1p();
             }
-            map.exist[k] = likely(map.log_odds[k]);
+            if self.corrects_poses() {
+                map.exist[k] = likely(map.log_odds[k]);
+            }
             map.last[k] = Some(view);
         }
     }
@@ -173,7 +194,12 @@ impl Engine<'_> {
             map.classes.push(self.looks[look].class);
             let background = &self.background[look];
             map.log_odds.push(background.new - background.clutter);
-            map.exist.push(likely(background.new - background.clutter));
+            // Where nothing is registered, nothing is lost by trusting every object.
+            map.exist.push(if self.corrects_poses() {
+                likely(background.new - background.clutter)
+            } else {
+                MOST_LIKELY
+            });
             map.last.push(Some(view));
             map.folded.push([[0.0; 4]; 4]);
             map.toward.push([0.0; 4]);
@@ -282,5 +308,5 @@ impl Engine<'_> {
 /// Registration never takes an object for certain, one way or the other: its own beginnings are
 /// rough.
 fn likely(log_odds: f64) -> f64 {
-    probability(log_odds).clamp(0.1, 0.9)
+    probability(log_odds).clamp(1.0 - MOST_LIKELY, MOST_LIKELY)
 }

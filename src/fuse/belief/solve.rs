@@ -128,6 +128,8 @@ impl Engine<'_> {
             nearest_m: vec![f64::INFINITY; n],
             poses: Vec::new(),
             couplings: Vec::new(),
+            links: Vec::new(),
+            spacing: 1,
         };
         for (k, x) in part.objects.iter().enumerate() {
             let prior = self.prior(x);
@@ -144,7 +146,12 @@ impl Engine<'_> {
             normal.information.push(a);
             normal.pull.push(b);
         }
-        if self.corrects_poses() {
+        if let Some(drift) = self.drifts(part.moving.len(), n) {
+            let chain = self.chain(&drift, part.moving);
+            normal.poses = chain.blocks;
+            normal.links = chain.links;
+            normal.spacing = 2;
+        } else if self.corrects_poses() {
             normal.couplings.reserve(part.edges.len());
             normal.poses.extend(part.moving.iter().map(|&view| {
                 let prior = Vector6::from(self.pose_information(view));
@@ -217,15 +224,22 @@ impl Engine<'_> {
             .map(|(a, b)| (to_matrix4(a), Vector4::from(*b)))
             .collect();
         let n_objects = objects.len();
-        let solution = if 4 * objects.len() < 6 * normal.poses.len() {
+        let spacing = normal.spacing;
+        let solution = if spacing == 1 && 4 * objects.len() < 6 * normal.poses.len() {
             objects_kept(objects, normal.poses, &normal.couplings, marginals)
         } else {
-            poses_kept(objects, normal.poses, &normal.couplings, marginals)
+            poses_kept(objects, normal.poses, normal.links, &normal.couplings, marginals)
         };
         let Some((steps, turns, marginal)) = solution else {
             return (vec![[0.0; 4]; n_objects], None);
         };
-        for (&view, turn) in moving.iter().zip(&turns) {
+        for (p, &view) in moving.iter().enumerate() {
+            let turn = &turns[p * spacing];
+            if spacing == 2 {
+                for (d, t) in self.drift[view].iter_mut().zip(turns[2 * p + 1].iter()) {
+                    *d += t;
+                }
+            }
             let mut delta = self.delta[view];
             for (d, t) in delta.iter_mut().zip(turn.iter()) {
                 *d += t;
@@ -235,7 +249,7 @@ impl Engine<'_> {
         let marginal = marginal.map(|(objects, poses)| {
             (
                 objects.iter().map(from_matrix).collect(),
-                poses.iter().map(from_matrix).collect(),
+                poses.iter().step_by(spacing).map(from_matrix).collect(),
             )
         });
         (steps.iter().map(|s| (*s).into()).collect(), marginal)
@@ -384,6 +398,10 @@ struct Normal {
     nearest_m: Vec<f64>,
     poses: Vec<PoseBlock>,
     couplings: Vec<Coupling>,
+    /// Couplings between poses, where they drift.
+    links: Vec<(usize, usize, SMatrix<f64, 6, 6>)>,
+    /// How many unknowns a view has among the poses: itself, and its drift.
+    spacing: usize,
 }
 
 impl Normal {
@@ -397,6 +415,7 @@ impl Normal {
             *p += h;
         }
         if corrects_poses && let Ok(p) = moving.binary_search(&row.view) {
+            let p = p * self.spacing;
             let (a, b) = &mut self.poses[p];
             row.add_to_pose(a, b, &toward);
             self.couplings.push((k, p, row.coupling()));
@@ -494,10 +513,12 @@ type Solution = (Vec<Vector4<f64>>, Vec<Vector6<f64>>, Option<Diagonals>);
 fn poses_kept(
     objects: Vec<ObjectBlock>,
     poses: Vec<PoseBlock>,
+    links: Vec<(usize, usize, SMatrix<f64, 6, 6>)>,
     couplings: &[Coupling],
     marginals: bool,
 ) -> Option<Solution> {
     let arrow = Arrow {
+        links,
         kept: poses,
         eliminated: objects,
         couplings: sorted(couplings, |c| (c.0, c.1))
@@ -519,6 +540,7 @@ fn objects_kept(
     marginals: bool,
 ) -> Option<Solution> {
     let arrow = Arrow {
+        links: Vec::new(),
         kept: objects,
         eliminated: poses,
         couplings: sorted(couplings, |c| (c.1, c.0))

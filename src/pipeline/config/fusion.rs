@@ -17,6 +17,12 @@ pub struct FusionConfig {
     pub min_weight: f64,
     /// `belief`: how poses are corrected.
     pub pose_correction: PoseCorrection,
+    /// `belief`: whether the detector's scores count.
+    pub scores: bool,
+    /// `belief`: the share of the variance of pose errors that drifts.
+    pub drift_share: f64,
+    /// `belief`: the way over which it drifts, metres.
+    pub drift_length_m: f64,
     /// `belief`: which side of a box says how large an object is.
     pub size_from: SizeRule,
     /// `belief`: standard deviation of the logarithm of an apparent size.
@@ -66,8 +72,8 @@ pub(super) fn fusion(section: Section<'_>) -> Option<FusionConfig> {
         .as_deref()
     {
         Some("em") => Some(Method::Em),
-        Some("belief") => Some(Method::Belief),
-        _ => Some(Method::Paper),
+        Some("paper") => Some(Method::Paper),
+        _ => Some(Method::Belief),
     };
     let words = ["off", "per-view", "drift"];
     let config = method.map(|method: Method| FusionConfig {
@@ -79,6 +85,11 @@ pub(super) fn fusion(section: Section<'_>) -> Option<FusionConfig> {
             Some("drift") => PoseCorrection::Drift,
             _ => PoseCorrection::PerView,
         },
+        scores: section.boolean("scores").unwrap_or(true),
+        drift_share: section
+            .number("drift_share", 0.0..=1.0, "0 to 1")
+            .unwrap_or(0.8),
+        drift_length_m: positive(&section, "drift_length_m", 16.0),
         size_from: match section.word("size_from", &["width", "height"]).as_deref() {
             Some("height") => SizeRule::Height,
             _ => SizeRule::Width,
