@@ -1,7 +1,7 @@
 //! What the data say of noise, clutter, density, sizes and detectability (3.5): one round of
 //! expectation maximisation.
 
-use super::algebra::{object_spread, pose_spread};
+use super::algebra::{Square6, object_spread, pose_spread};
 use super::engine::{Engine, START_CLUTTER, START_TRANSIENTS, Scores};
 use super::evidence::{Evidence, probability};
 use super::looks::Repeats;
@@ -17,7 +17,7 @@ const SCALES: (f64, f64) = (0.3, 3.0);
 /// The stated noise of poses counts for this many views.
 const POSE_COUNT: f64 = 4.0;
 /// Fewer views say nothing about the noise of their poses.
-const LEAST_VIEWS: usize = 6;
+pub(super) const LEAST_VIEWS: usize = 6;
 /// Squared factors on the noise of poses are kept between these.
 const POSE_SCALES2: (f64, f64) = (0.02, 9.0);
 /// Heights are kept between these, metres.
@@ -71,7 +71,7 @@ impl Engine<'_> {
         // taken for less than it is.
         let drifts = self.drift_law().is_some();
         if self.corrects_poses() && !drifts && self.n_views() >= LEAST_VIEWS {
-            self.learn_pose_noise();
+            self.learn_pose_noise(None);
         }
         self.learn_heights(&real, &support);
         self.learn_rates(evidence, &real, &support);
@@ -144,14 +144,17 @@ impl Engine<'_> {
         }
     }
 
-    fn learn_pose_noise(&mut self) {
+    /// Noise of the poses, by their errors and how well those are known: with all else held, as
+    /// rounds have it, or all else free, which counts what views share too.
+    pub(super) fn learn_pose_noise(&mut self, marginal: Option<&[Square6]>) {
         #[expect(clippy::cast_precision_loss, reason = "a count of views")]
         let n_views = self.n_views() as f64;
         let mut squares = [0.0; 6];
         for (view, platform) in self.platforms.iter().enumerate() {
             for (i, square) in squares.iter_mut().enumerate() {
                 let error = self.delta[view][i];
-                let sum = error * error + self.pose_cov[view][i][i];
+                let cov = marginal.map_or(&self.pose_cov[view], |m| &m[view]);
+                let sum = error * error + cov[i][i];
                 *square += sum / platform.sigma[i].powi(2) / n_views;
             }
         }

@@ -7,7 +7,8 @@ use serde::Serialize;
 use super::algebra::{Square4, to_matrix6};
 use super::engine::Engine;
 use super::evidence::{Evidence, probability};
-use super::solve::Robust;
+use super::learn::LEAST_VIEWS;
+use super::solve::{Robust, Stepped};
 use super::BeliefSettings;
 use crate::adjust::Problem;
 use crate::frame::{Enu, Point};
@@ -216,6 +217,24 @@ impl Engine<'_> {
         (evidence, ROUNDS, false)
     }
 
+    /// The adjustment that covariances are taken of. What is learnt of the poses' noise on the way
+    /// leaves out errors that views share; the covariances shall not.
+    fn last_adjustment(&mut self) -> Option<Stepped> {
+        let mut stepped = self.adjust(3, Robust::Contaminated, true);
+        let learns = self.corrects_poses() && self.drift_law().is_none();
+        if learns && self.n_views() >= LEAST_VIEWS {
+            for _ in 0..2 {
+                let marginal = stepped.as_ref().and_then(|s| s.marginal.as_ref());
+                let Some(poses) = marginal.map(|m| m.1.clone()) else {
+                    break;
+                };
+                self.learn_pose_noise(Some(&poses));
+                stepped = self.adjust(1, Robust::Contaminated, true);
+            }
+        }
+        stepped
+    }
+
     /// Logarithm of the posterior, up to a constant: every detection clutter, what each object adds
     /// to that, and the poses.
     fn objective(&self, evidence: &Evidence) -> f64 {
@@ -251,7 +270,7 @@ impl Engine<'_> {
         rounds: usize,
         converged: bool,
     ) -> Belief {
-        let stepped = self.adjust(3, Robust::Contaminated, true);
+        let stepped = self.last_adjustment();
         self.weigh_background();
         let evidence = self.weigh(self.expectation());
         let log_odds = evidence.final_log_odds();
