@@ -21,9 +21,7 @@ pub use record::{Attitude, PoseKey, PoseRow, Position};
 pub use reference::{HeadingReference, North};
 pub use time::Time;
 pub use track::{NoPose, Track};
-pub use writer::{
-    ImageRecord, PoseRecord, format_time, poses_text, write_images, write_poses,
-};
+pub use writer::{ImageRecord, PoseRecord, format_time, poses_text, write_images, write_poses};
 
 use nalgebra::{Matrix6, Vector6};
 use serde::Serialize;
