@@ -209,7 +209,10 @@ impl Engine<'_> {
     /// Probability that the object's reading lies in the picture, or in the sector.
     fn in_picture(&self, view: usize, seen: &Expected, spread: &Square4) -> f64 {
         let platform = &self.platforms[view];
-        let sigma = |r: usize| (spread[r][r] + self.typical[r] * self.typical[r]).sqrt();
+        let sigma = |r: usize| {
+            let noise = self.typical[r] * self.model.scales[r];
+            (spread[r][r] + noise * noise).sqrt()
+        };
         let within = |x: f64, low: f64, high: f64, sigma: f64| {
             normal_cdf((x - low) / sigma) - normal_cdf((x - high) / sigma)
         };
