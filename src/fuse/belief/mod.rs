@@ -19,6 +19,8 @@ mod sequence;
 mod single;
 mod associate;
 mod solve;
+#[cfg(test)]
+mod tests;
 
 pub use outcome::{fuse_belief, Belief, BeliefObject, BeliefEvidence, Single};
 
