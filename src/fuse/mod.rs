@@ -23,6 +23,9 @@
 //! assert_eq!(map.objects.len(), 2);
 //! assert!((map.objects[0].place.xyz.x - 0.05).abs() < 0.01);
 //! ```
+//!
+//! [`belief`] does without places: it takes what views measured, and finds the errors of their poses
+//! with the map.
 
 mod assignment;
 pub mod belief;

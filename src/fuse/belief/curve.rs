@@ -23,6 +23,22 @@ impl Detectability {
         }
     }
 
+    /// A curve of known values, in bins of one width.
+    #[cfg(test)]
+    pub(super) fn of(low: f64, high: f64, values: Vec<f64>) -> Self {
+        let bins = u8::try_from(values.len()).unwrap();
+        Self {
+            values,
+            ..Self::new(low, high, bins)
+        }
+    }
+
+    /// The lower end of the first bin, and the width of each.
+    #[cfg(test)]
+    pub(super) fn bins(&self) -> (f64, f64) {
+        (self.low, self.step)
+    }
+
     pub(super) fn values(&self) -> &[f64] {
         &self.values
     }

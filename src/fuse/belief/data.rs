@@ -9,7 +9,7 @@ use super::algebra::{Square6, from_matrix};
 use super::{BeliefSettings, SizeRule};
 use crate::adjust::{Measurement, Problem, Reading};
 use crate::camera::{Camera, Lens};
-use crate::frame::{Body, LocalEnu, RigidTransform, Vector};
+use crate::frame::{Body, LocalEnu, Pixel, RigidTransform, Vector};
 use crate::view::View;
 
 /// Standard deviations of poses that are taken as exact, metres and radians.
@@ -21,6 +21,9 @@ pub(super) struct Platform {
     pub(super) camera: Option<Arc<Camera>>,
     /// Whether its picture is so wide that a metre looks as wide all around it.
     pub(super) is_wide: bool,
+    /// Cosine of an angle off the optical axis beyond which nothing comes near the picture; -1
+    /// where no such angle is known.
+    pub(super) least_cosine: f64,
     pub(super) body_from_camera: Matrix3<f64>,
     /// The camera's centre in body axes; the body's origin where there is none.
     pub(super) arm: Vector3<f64>,
@@ -92,6 +95,7 @@ pub(super) fn platforms(problem: &Problem<'_>, order: &[usize], fov: f64) -> Vec
         let camera = view.camera.clone();
         Platform {
             is_wide: camera.as_deref().is_some_and(is_wide),
+            least_cosine: camera.as_deref().map_or(-1.0, least_cosine),
             camera,
             body_from_camera: mount.rotation.matrix(),
             arm: mount.translation.xyz,
@@ -116,6 +120,31 @@ fn is_wide(camera: &Camera) -> bool {
         camera.lens,
         Lens::Fisheye(_) | Lens::Equirectangular(_) | Lens::Cahvore(_)
     )
+}
+
+/// Cosine of the angle off the axis that holds the picture with half a picture around it, and a
+/// tenth more; -1 where the lens says no rays that far out.
+fn least_cosine(camera: &Camera) -> f64 {
+    const SIDE: u32 = 32;
+    const MORE: f64 = 1.1;
+    if is_wide(camera) {
+        return -1.0;
+    }
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let mut most = 0.0f64;
+    for i in 0..=SIDE {
+        let share = 2.0 * f64::from(i) / f64::from(SIDE) - 0.5;
+        let (u, v) = (share * width - 0.5, share * height - 0.5);
+        let (left, right) = (-0.5 * width - 0.5, 1.5 * width - 0.5);
+        let (top, bottom) = (-0.5 * height - 0.5, 1.5 * height - 0.5);
+        for (u, v) in [(left, v), (right, v), (u, top), (u, bottom)] {
+            let Ok(ray) = camera.ray(Pixel::new(u, v)) else {
+                return -1.0;
+            };
+            most = most.max(ray.direction.xyz().z.clamp(-1.0, 1.0).acos());
+        }
+    }
+    (MORE * most).min(PI).cos()
 }
 
 /// Seconds since the first view, if every view has a time.

@@ -184,6 +184,9 @@ impl Rows {
     ) -> Expected {
         let (mut by_object, mut by_pose) = ([[0.0; 4]; 4], [[0.0; 6]; 4]);
         let turning = skew(in_body) * pose.right_jacobian;
+        // A camera off the body's origin moves as the body turns, and with it the near face.
+        let swings = pose.rotation * skew(platform.arm) * pose.right_jacobian;
+        let face_follows = Matrix3::identity() - by_place;
         for (r, by_body) in self.by_body.iter().enumerate() {
             let Some(by_body) = by_body else { continue };
             // True north does not turn with the platform.
@@ -196,10 +199,12 @@ impl Rows {
             let by_middle = by_place.tr_mul(&by_face);
             for i in 0..3 {
                 by_object[r][i] = by_middle[i];
-                by_pose[r][i] = -by_face[i];
+                // View and object moved alike read the same.
+                by_pose[r][i] = -by_middle[i];
             }
             if turns {
-                let by_turn = turning.tr_mul(by_body);
+                let by_turn =
+                    turning.tr_mul(by_body) - swings.tr_mul(&face_follows.tr_mul(&by_face));
                 for i in 0..3 {
                     by_pose[r][3 + i] = by_turn[i];
                 }

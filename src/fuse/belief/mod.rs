@@ -1,4 +1,131 @@
-//! Belief fusion.
+//! Belief fusion: the map and the errors of the poses together, from what views measured.
+//!
+//! Objects have four unknowns: east, north, up, and the logarithm of their size. Views have the six
+//! errors of their poses. Which detection is of which object is summed over, not decided; how noisy
+//! readings are, how dense objects and clutter, how often objects are detected is learnt on the way.
+//!
+//! The module knows no files. A [`Problem`](crate::adjust::Problem) holds views, measurements and a
+//! ground; [`fuse_belief`] makes a [`Belief`] of it:
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use nalgebra::{UnitQuaternion, Vector2};
+//! use rockmap::adjust::{LevelPlane, Measurement, Problem, Reading};
+//! use rockmap::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
+//! use rockmap::frame::{Point, RigidTransform, Rotation, Vector};
+//! use rockmap::fuse::belief::{BeliefSettings, fuse_belief};
+//! use rockmap::pose::{Pose, PoseSigma};
+//! use rockmap::view::View;
+//!
+//! // A camera two metres above the ground that looks 20 degrees down, at six places along the way.
+//! let intrinsics = Intrinsics { fx: 800.0, fy: 800.0, cx: 639.5, cy: 479.5 };
+//! let camera = Arc::new(Camera {
+//!     name: "mast".into(),
+//!     width: 1280,
+//!     height: 960,
+//!     lens: Lens::Pinhole(Pinhole::new(intrinsics)?),
+//!     mount: Mount::default(),
+//! });
+//! let down = UnitQuaternion::from_euler_angles(0.0, 20f64.to_radians(), 0.0);
+//! let view = |i: u32| View {
+//!     image_id: format!("view{i}"),
+//!     listed: ("poses.csv".into(), 1),
+//!     time: None,
+//!     platform: None,
+//!     picture: None,
+//!     camera: Some(camera.clone()),
+//!     head: PanTilt::default(),
+//!     pose: Pose {
+//!         enu_from_body: RigidTransform::new(
+//!             Rotation::from_unit_quaternion(down),
+//!             Vector::new(f64::from(i), 0.0, 2.0),
+//!         ),
+//!         sigma: PoseSigma {
+//!             east_m: 0.02,
+//!             north_m: 0.02,
+//!             up_m: 0.01,
+//!             roll: 0.002,
+//!             pitch: 0.002,
+//!             yaw: 0.002,
+//!         },
+//!         has_heading: true,
+//!     },
+//!     enu_from_local: Rotation::identity(),
+//! };
+//! let views: Vec<View> = (0..6).map(view).collect();
+//!
+//! // Four rocks of 30 cm, which every view detects where it sees them.
+//! let rocks = [[9.0, -1.0], [9.5, 1.5], [11.0, 0.2], [12.5, -2.0]];
+//! let mut measurements = Vec::new();
+//! for (index, view) in views.iter().enumerate() {
+//!     for [east_m, north_m] in rocks {
+//!         let place = Point::new(east_m, north_m, 0.0);
+//!         let in_camera = view.enu_from_camera().expect("a camera").inverse() * place;
+//!         let side_px = 0.3 * intrinsics.fx / in_camera.xyz.z;
+//!         measurements.push(Measurement {
+//!             view: index,
+//!             reading: Reading::Pixel {
+//!                 pixel: camera.pixel(in_camera)?,
+//!                 sigma_px: Vector2::new(1.5, 1.5),
+//!                 range: None,
+//!             },
+//!             log_size: Some(side_px.ln()),
+//!             box_px: Some(Vector2::new(side_px, side_px)),
+//!             is_cut: false,
+//!             class: 0,
+//!             score: Some(0.9),
+//!         });
+//!     }
+//! }
+//!
+//! let problem = Problem {
+//!     views: &views,
+//!     measurements: &measurements,
+//!     surface: &LevelPlane::default(),
+//!     height_sigma_m: 0.02,
+//!     max_range_m: 15.0,
+//!     min_range_m: 0.0,
+//! };
+//! let belief = fuse_belief(&problem, &BeliefSettings::default());
+//! let real: Vec<_> = belief.objects.iter().filter(|o| o.p_exist > 0.5).collect();
+//! assert_eq!(real.len(), rocks.len());
+//! for [east_m, north_m] in rocks {
+//!     let rock = Point::new(east_m, north_m, 0.0);
+//!     let found = real.iter().find(|o| o.place.distance(rock) < 0.01).expect("every rock");
+//!     assert!((found.size_m.expect("boxes say a size") - 0.3).abs() < 0.01);
+//!     assert_eq!(found.members.len(), views.len());
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Reading order
+//!
+//! `outcome` is the table of contents: beginnings, stage A, stage B, output. Sections are those of the
+//! method's description that the files refer to.
+//!
+//! | file | step | section |
+//! |---|---|---|
+//! | `data` | views and detections as the loops read them | 0 |
+//! | `algebra` | four and six rows: factors, inverses, spreads | |
+//! | `expect` | what a view would read of an object, with derivatives by object and pose | 0 |
+//! | `noise` | variances of readings, the contaminated normal, its robust weight | 0, 3.1 |
+//! | `engine` | everything believed at one moment; priors of objects, the background of detections | 0, 3.1 |
+//! | `ground`, `footprint` | heights looked up; ground and room that views see | 0, 3.1 |
+//! | `single` | what one detection says by itself; where everything starts | 0 |
+//! | `curve` | how often objects are detected, by apparent size or range | 3.1 |
+//! | `near` | objects near a place | |
+//! | `pairs` | which objects a view expects, and which detections may be of them | 3.1 |
+//! | `looks` | how many independent looks a row of looks is worth | 3.x |
+//! | `register` | stage A: where a view stands, given the objects so far | 3.6 |
+//! | `sequence` | stage A: view after view, over a window that still moves | 3.6 |
+//! | `associate` | stage B: memberships, births, deaths | 3.2, 3.3 |
+//! | `solve` | stage B: one Gauss-Newton step of places and poses, and covariances | 3.4 |
+//! | `merge` | stage B: objects that are one | 3.3 |
+//! | `evidence` | log-odds that each object is real | 3.5 |
+//! | `learn` | noise, clutter, density, sizes, detectability | 3.5 |
+//! | `outcome` | the whole, and what comes of it | 3.7, 3.8 |
+
 mod algebra;
 mod curve;
 mod data;
@@ -20,6 +147,8 @@ mod sequence;
 mod single;
 mod associate;
 mod solve;
+#[cfg(test)]
+mod tests;
 
 pub use drift::Drift;
 pub use outcome::{fuse_belief, Belief, BeliefObject, BeliefEvidence, Single};

@@ -1,5 +1,6 @@
 //! What views expect to see, and which detections may be of it (3.1).
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::algebra::{ByPose, Square4, Square6, object_spread, pose_spread};
@@ -144,7 +145,7 @@ impl Engine<'_> {
         for k in among.near.about(origin.x, origin.y, reach_m) {
             let x = &among.objects[k];
             let away2 = (x[0] - origin.x).powi(2) + (x[1] - origin.y).powi(2);
-            if away2 > reach_m * reach_m {
+            if away2 > reach_m * reach_m || self.is_aside(view, x) {
                 continue;
             }
             if let Some(mut pair) = self.pair(view, k, x, &among.cov[k], pose_cov) {
@@ -163,6 +164,19 @@ impl Engine<'_> {
             }
         }
         found
+    }
+
+    /// Whether an object lies so far off a camera's axis that its reading need not be computed:
+    /// most of those in reach do.
+    fn is_aside(&self, view: usize, x: &[f64; 4]) -> bool {
+        let (platform, pose) = (&self.platforms[view], &self.poses[view]);
+        // The near face may stand at another angle than the middle.
+        if platform.least_cosine <= -1.0 || self.settings.radius_m > 0.0 {
+            return false;
+        }
+        let away = Vector3::new(x[0], x[1], x[2]) - pose.origin;
+        let depth = pose.from_camera.column(2).dot(&away);
+        depth < platform.least_cosine * away.norm()
     }
 
     fn pair(
@@ -209,7 +223,10 @@ impl Engine<'_> {
     /// Probability that the object's reading lies in the picture, or in the sector.
     fn in_picture(&self, view: usize, seen: &Expected, spread: &Square4) -> f64 {
         let platform = &self.platforms[view];
-        let sigma = |r: usize| (spread[r][r] + self.typical[r] * self.typical[r]).sqrt();
+        let sigma = |r: usize| {
+            let noise = self.typical[r] * self.model.scales[r];
+            (spread[r][r] + noise * noise).sqrt()
+        };
         let within = |x: f64, low: f64, high: f64, sigma: f64| {
             normal_cdf((x - low) / sigma) - normal_cdf((x - high) / sigma)
         };
