@@ -2,17 +2,20 @@
 
 mod bench_accuracy;
 mod check;
+mod completions;
 mod console;
 mod evaluate;
+mod man;
 mod options;
 mod reproduce;
+mod schema;
 mod simulate;
+mod tell;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::error::Error;
 use crate::pipeline;
 
 /// Maps of rocks from posed pictures: projects every detection onto the terrain, fuses all views
@@ -32,11 +35,27 @@ const EXAMPLES: &str = "Examples:
 
 Exit codes: 0 done, 1 done but more records were faulty than the run allows, 2 not done.";
 
+const RUN_EXAMPLES: &str = "Examples:
+  rockmap run pipelines/demo.toml
+  rockmap run night.toml --data /logs/sol-17 --out /maps/sol-17 --force
+  rockmap run night.toml --set view.max_range_m=20 --set noise.pose.yaw_deg=0.8
+  rockmap run night.toml --json | jq .n_objects
+
+Exit codes: 0 done, 1 done but more records were faulty than the run allows, 2 not done.";
+
+const PROJECT_EXAMPLES: &str = "Examples:
+  rockmap project pipelines/demo.toml --out outputs/demo-single
+  rockmap project night.toml --data /logs/sol-17 --json | jq .rejected
+
+Exit codes: 0 done, 1 done but more records were faulty than the run allows, 2 not done.";
+
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Read, project, fuse and publish: the whole job
+    #[command(after_help = RUN_EXAMPLES)]
     Run(options::JobArgs),
     /// The same up to the ground: every detection by itself, with footprints and rejects
+    #[command(after_help = PROJECT_EXAMPLES)]
     Project(options::JobArgs),
     /// Validate a pipeline and all its inputs, compute nothing, list all faults at once
     Check(check::Args),
@@ -48,6 +67,12 @@ enum Command {
     Reproduce(reproduce::Args),
     /// Compare methods over many scenes and seeds
     BenchAccuracy(bench_accuracy::Args),
+    /// Print a script that lets a shell complete commands and options
+    Completions(completions::Args),
+    /// Print the manual page, or write those of all commands
+    Man(man::Args),
+    /// Print the JSON Schema of the pipeline file, for editors
+    Schema(schema::Args),
 }
 
 /// Does what the command line says and tells how it went by the exit code: 0 done, 1 done with more
@@ -62,24 +87,15 @@ pub fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::evaluate(&args),
         Command::Reproduce(args) => reproduce::reproduce(&args),
         Command::BenchAccuracy(args) => bench_accuracy::bench_accuracy(&args),
+        Command::Completions(args) => completions::completions(&args),
+        Command::Man(args) => man::man(&args),
+        Command::Schema(args) => schema::schema(&args),
     };
     match done {
         Ok(code) => code,
         Err(error) => {
-            tell(&error);
+            tell::error(&error);
             ExitCode::from(2)
         }
-    }
-}
-
-/// Prints an error, one line a fault.
-fn tell(error: &Error) {
-    match error {
-        Error::Faults(faults) => {
-            for fault in faults {
-                eprintln!("error: {fault}");
-            }
-        }
-        other => eprintln!("error: {other}"),
     }
 }

@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use toml_edit::{Item, TableLike, Value};
 
 use super::Section;
+use super::asked::Asked;
 use crate::error::{Fault, Place};
 
 /// A parsed TOML file, with the command line's overrides laid over it.
@@ -13,6 +14,7 @@ pub struct Document {
     pub(super) file: String,
     pub(super) root: Node,
     pub(super) faults: RefCell<Vec<Fault>>,
+    pub(super) asked: RefCell<Vec<Asked>>,
 }
 
 /// A value and where it stands.
@@ -47,6 +49,7 @@ impl Document {
             file: shown.to_owned(),
             root: table_node(text, shown, parsed.as_table(), Place::file(shown)),
             faults: RefCell::default(),
+            asked: RefCell::default(),
         })
     }
 
@@ -58,6 +61,7 @@ impl Document {
             file: self.file,
             root: self.root.over(base.root),
             faults: self.faults,
+            asked: self.asked,
         }
     }
 
@@ -108,6 +112,11 @@ impl Document {
     /// The whole file as a section.
     pub fn root(&self) -> Section<'_> {
         Section::root(self)
+    }
+
+    /// The keys that were asked for, each once, in the order of asking.
+    pub fn asked(&self) -> Vec<Asked> {
+        self.asked.borrow().clone()
     }
 
     /// All faults found while reading, in the order of the file.

@@ -9,7 +9,7 @@ use super::paths::{Paths, Source};
 use crate::detection::Aim;
 use crate::error::{Error, Fault};
 use crate::frame::{Crs, Geodetic, Planet};
-use crate::input::{Document, Section};
+use crate::input::{Asked, Document, Section};
 use crate::pose::PoseSigma;
 use crate::publish::Format;
 
@@ -196,6 +196,18 @@ impl Config {
             Some(config) if faults.is_empty() => Ok(config),
             _ => Err(Error::Faults(faults)),
         }
+    }
+
+    /// Every key a pipeline file may have, as the reader asks for it.
+    pub(super) fn keys() -> Vec<Asked> {
+        // Tables that are read only where they are present are present here.
+        let probe = "[site]\norigin = { lat_deg = 0, lon_deg = 0 }\n";
+        let Ok(document) = Document::parse(probe, "probe") else {
+            return Vec::new();
+        };
+        let here = Path::new("pipeline.toml");
+        Self::sections(&document.root(), here, &Overrides::default());
+        document.asked()
     }
 
     fn sections(root: &Section<'_>, path: &Path, overrides: &Overrides) -> Option<Self> {
