@@ -22,6 +22,7 @@
 //! | [`simulate`] | scenes with known truth: traverses, detectors, rendered pictures |
 //! | [`bound`] | the best map that labelled detections allow |
 //! | [`pipeline`] | a pipeline file to a map |
+//! | [`compare`] | two maps of one place: what is the same, new, gone or moved |
 //! | [`experiment`] | the paper's experiments, and a bench of methods over scenes |
 //! | [`cli`] | the command line |
 
@@ -54,6 +55,8 @@ pub mod simulate;
 pub mod bound;
 
 pub mod pipeline;
+
+pub mod compare;
 
 pub mod experiment;
 

@@ -26,12 +26,13 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-const COMMANDS: [&str; 10] = [
+const COMMANDS: [&str; 11] = [
     "run",
     "project",
     "check",
     "simulate",
     "evaluate",
+    "compare",
     "reproduce",
     "bench-accuracy",
     "completions",

@@ -2,6 +2,7 @@
 
 mod bench_accuracy;
 mod check;
+mod compare;
 mod completions;
 mod console;
 mod evaluate;
@@ -63,6 +64,8 @@ enum Command {
     Simulate(simulate::Args),
     /// Hold a map against the truth: precision, recall, GOSPA, calibration
     Evaluate(evaluate::Args),
+    /// Hold two maps of one place against each other: what is the same, new, gone, moved
+    Compare(compare::Args),
     /// Make the figures of Thompson and Wettergreen (2005) anew, with this program's numbers
     Reproduce(reproduce::Args),
     /// Compare methods over many scenes and seeds
@@ -85,6 +88,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::check(&args),
         Command::Simulate(args) => simulate::simulate(&args),
         Command::Evaluate(args) => evaluate::evaluate(&args),
+        Command::Compare(args) => compare::compare(&args),
         Command::Reproduce(args) => reproduce::reproduce(&args),
         Command::BenchAccuracy(args) => bench_accuracy::bench_accuracy(&args),
         Command::Completions(args) => completions::completions(&args),
