@@ -24,6 +24,7 @@
 //! | [`bound`] | the best map that labelled detections allow |
 //! | [`import`] | cameras and poses of others turned into files of our own |
 //! | [`pipeline`] | a pipeline file to a map |
+//! | [`compare`] | two maps of one place: what is the same, new, gone or moved |
 //! | [`experiment`] | the paper's experiments, and a bench of methods over scenes |
 //! | [`cli`] | the command line |
 
@@ -60,6 +61,8 @@ pub mod bound;
 pub mod import;
 
 pub mod pipeline;
+
+pub mod compare;
 
 pub mod experiment;
 

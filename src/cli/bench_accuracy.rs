@@ -8,8 +8,13 @@ use crate::error::Error;
 use crate::evaluate;
 use crate::experiment::bench::{BenchOptions, Contender, bench_accuracy as carry_out, parse_seeds};
 
+const EXAMPLES: &str = "Examples:
+  rockmap bench-accuracy fixtures/scenes/default.toml --seeds 1..20
+  rockmap bench-accuracy fixtures/scenes/*.toml --seeds 1..5 --methods em,paper --out /tmp/accuracy";
+
 /// What `rockmap bench-accuracy` takes.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// Scene files
     #[arg(value_name = "SCENE.toml", required = true)]

@@ -6,7 +6,11 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use serde_json::{Value, json};
 
+use super::tell;
+use crate::error::Error;
 use crate::pipeline::{Observer, Summary};
 
 /// Shows progress: bars on a terminal, a plain line a stage elsewhere, nothing where quiet.
@@ -64,19 +68,81 @@ impl Observer for Console {
     }
 }
 
-/// Prints warnings and the closing table, and turns the end of a run into its exit code.
-pub(super) fn close(summary: &Summary, quiet: bool) -> ExitCode {
-    for warning in &summary.warnings {
-        eprintln!("warning: {warning}");
+/// How a job says what came of it.
+#[derive(Debug, clap::Args)]
+pub(super) struct Closing {
+    /// Say nothing but errors and warnings
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+    /// Print what came of it as JSON instead of a table; faults too
+    #[arg(long)]
+    json: bool,
+}
+
+impl Closing {
+    /// Does a job, prints what came of it, and turns its end into an exit code.
+    pub(super) fn close(
+        &self,
+        job: impl FnOnce() -> Result<Summary, Error>,
+    ) -> Result<ExitCode, Error> {
+        let summary = match job() {
+            Ok(summary) => summary,
+            Err(error) => {
+                if self.json {
+                    print_json(&tell::json(&error))?;
+                }
+                return Err(error);
+            }
+        };
+        for warning in &summary.warnings {
+            tell::warning(warning);
+        }
+        if self.json {
+            print_json(&json(&summary))?;
+        } else if !self.quiet {
+            print!("{}", table(&summary));
+        }
+        if summary.too_many_rejects {
+            tell::error_line("more records were faulty than input.max_reject_share allows");
+            return Ok(ExitCode::from(1));
+        }
+        Ok(ExitCode::SUCCESS)
     }
-    if !quiet {
-        print!("{}", table(summary));
-    }
-    if summary.too_many_rejects {
-        eprintln!("error: more records were faulty than input.max_reject_share allows");
-        return ExitCode::from(1);
-    }
-    ExitCode::SUCCESS
+}
+
+/// Prints JSON for a script.
+pub(super) fn print_json(value: &impl Serialize) -> Result<(), Error> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|e| Error::Output(format!("cannot write JSON: {e}")))?;
+    println!("{text}");
+    Ok(())
+}
+
+/// The summary as a script takes it.
+fn json(summary: &Summary) -> Value {
+    let rejects = summary.rejects.iter().map(|r| {
+        json!({
+            "file": r.file,
+            "line": r.line,
+            "record": r.record,
+            "reason": r.reason,
+            "detail": r.detail,
+        })
+    });
+    json!({
+        "run_id": summary.run_id,
+        "folder": summary.folder,
+        "files": summary.files,
+        "n_views": summary.n_views,
+        "n_placed": summary.folder.as_ref().map(|_| summary.n_placed),
+        "n_objects": summary.n_objects,
+        "n_annotated": summary.n_objects.map(|_| summary.n_annotated),
+        "rejected": summary.rejected(),
+        "rejects": rejects.collect::<Vec<_>>(),
+        "warnings": summary.warnings,
+        "stages": summary.stages,
+        "too_many_rejects": summary.too_many_rejects,
+    })
 }
 
 /// The closing table: inputs, rejects by reason, objects, time a stage.

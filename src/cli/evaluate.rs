@@ -7,8 +7,14 @@ use crate::error::Error;
 use crate::evaluate::{self, Comparison, Options, Report, Sources, Truth, associate, read_labels};
 use crate::pipeline::{self, Bound, Config, Overrides, Silent};
 
+const EXAMPLES: &str = "Examples:
+  rockmap evaluate outputs/demo/rocks.geojson --truth outputs/demo-data/truth.csv
+  rockmap evaluate map/rocks.geojson --truth truth.csv --ignore ignore.csv --radius 0.5 --by-class
+  rockmap evaluate map/rocks.geojson --truth truth.csv --labels labels.csv --bound fair --json";
+
 /// What `rockmap evaluate` takes.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// The map, rocks.geojson
     #[arg(value_name = "MAP")]

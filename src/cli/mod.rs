@@ -3,18 +3,22 @@
 mod bench_accuracy;
 mod camera;
 mod check;
+mod compare;
+mod completions;
 mod console;
 mod evaluate;
 mod import;
+mod man;
 mod options;
 mod reproduce;
+mod schema;
 mod simulate;
+mod tell;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::error::Error;
 use crate::pipeline;
 
 /// Maps of rocks from posed pictures: projects every detection onto the terrain, fuses all views
@@ -34,11 +38,27 @@ const EXAMPLES: &str = "Examples:
 
 Exit codes: 0 done, 1 done but more records were faulty than the run allows, 2 not done.";
 
+const RUN_EXAMPLES: &str = "Examples:
+  rockmap run pipelines/demo.toml
+  rockmap run night.toml --data /logs/sol-17 --out /maps/sol-17 --force
+  rockmap run night.toml --set view.max_range_m=20 --set noise.pose.yaw_deg=0.8
+  rockmap run night.toml --json | jq .n_objects
+
+Exit codes: 0 done, 1 done but more records were faulty than the run allows, 2 not done.";
+
+const PROJECT_EXAMPLES: &str = "Examples:
+  rockmap project pipelines/demo.toml --out outputs/demo-single
+  rockmap project night.toml --data /logs/sol-17 --json | jq .rejected
+
+Exit codes: 0 done, 1 done but more records were faulty than the run allows, 2 not done.";
+
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Read, project, fuse and publish: the whole job
+    #[command(after_help = RUN_EXAMPLES)]
     Run(options::JobArgs),
     /// The same up to the ground: every detection by itself, with footprints and rejects
+    #[command(after_help = PROJECT_EXAMPLES)]
     Project(options::JobArgs),
     /// Validate a pipeline and all its inputs, compute nothing, list all faults at once
     Check(check::Args),
@@ -48,12 +68,20 @@ enum Command {
     Evaluate(evaluate::Args),
     /// Turn calibrations and rover labels of others into cameras.toml, images.csv and poses.csv
     Import(import::Args),
+    /// Hold two maps of one place against each other: what is the same, new, gone, moved
+    Compare(compare::Args),
     /// Make the figures of Thompson and Wettergreen (2005) anew, with this program's numbers
     Reproduce(reproduce::Args),
     /// Compare methods over many scenes and seeds
     BenchAccuracy(bench_accuracy::Args),
     /// Ask a camera for the rays of pixels or the pixels of points
     Camera(camera::Args),
+    /// Print a script that lets a shell complete commands and options
+    Completions(completions::Args),
+    /// Print the manual page, or write those of all commands
+    Man(man::Args),
+    /// Print the JSON Schema of the pipeline file, for editors
+    Schema(schema::Args),
 }
 
 /// Does what the command line says and tells how it went by the exit code: 0 done, 1 done with more
@@ -70,24 +98,16 @@ pub fn main() -> ExitCode {
         Command::Reproduce(args) => reproduce::reproduce(&args),
         Command::BenchAccuracy(args) => bench_accuracy::bench_accuracy(&args),
         Command::Camera(args) => camera::camera(&args),
+        Command::Compare(args) => compare::compare(&args),
+        Command::Completions(args) => completions::completions(&args),
+        Command::Man(args) => man::man(&args),
+        Command::Schema(args) => schema::schema(&args),
     };
     match done {
         Ok(code) => code,
         Err(error) => {
-            tell(&error);
+            tell::error(&error);
             ExitCode::from(2)
         }
-    }
-}
-
-/// Prints an error, one line a fault.
-fn tell(error: &Error) {
-    match error {
-        Error::Faults(faults) => {
-            for fault in faults {
-                eprintln!("error: {fault}");
-            }
-        }
-        other => eprintln!("error: {other}"),
     }
 }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::console::{self, Console};
+use super::console::{Closing, Console};
 use crate::error::{Error, Fault, Place};
 use crate::pipeline::{Config, Observer, Overrides, Summary};
 
@@ -40,9 +40,8 @@ pub(super) struct JobArgs {
     /// Replace the outputs of another run
     #[arg(long)]
     force: bool,
-    /// Say nothing but errors and warnings
-    #[arg(long, short)]
-    quiet: bool,
+    #[command(flatten)]
+    closing: Closing,
 }
 
 /// A job of the pipeline.
@@ -51,9 +50,11 @@ type Job = fn(&Config, bool, &dyn Observer) -> Result<Summary, Error>;
 impl JobArgs {
     /// Carries the job out and closes with its table.
     pub(super) fn carry_out(&self, job: Job) -> Result<ExitCode, Error> {
-        let config = self.pipeline.config(self.out.as_ref())?;
-        let summary = job(&config, self.force, &Console::new(self.quiet))?;
-        Ok(console::close(&summary, self.quiet))
+        let console = Console::new(self.closing.quiet);
+        self.closing.close(|| {
+            let config = self.pipeline.config(self.out.as_ref())?;
+            job(&config, self.force, &console)
+        })
     }
 }
 

@@ -7,8 +7,13 @@ use super::console::Console;
 use crate::error::Error;
 use crate::experiment::{ReproduceOptions, reproduce as carry_out};
 
+const EXAMPLES: &str = "Examples:
+  rockmap reproduce
+  rockmap reproduce --trials 200 --seed 7 --out /tmp/reproduction";
+
 /// What `rockmap reproduce` takes.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// The folder figures and numbers are written to
     #[arg(long, value_name = "DIR", default_value = "outputs/reproduction")]

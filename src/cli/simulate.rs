@@ -6,8 +6,13 @@ use std::process::ExitCode;
 use crate::error::Error;
 use crate::simulate::{self, Scene};
 
+const EXAMPLES: &str = "Examples:
+  rockmap simulate fixtures/scenes/demo.toml --out outputs/demo-data
+  rockmap simulate scene.toml --out /tmp/second-night --seed 2";
+
 /// What `rockmap simulate` takes.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// The scene file
     #[arg(value_name = "SCENE.toml")]

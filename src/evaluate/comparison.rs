@@ -9,7 +9,7 @@ use super::map::{Estimate, RockMap};
 use super::truth::{IgnoredPlace, TrueObject};
 use super::{Options, Truth};
 use crate::error::{Error, Fault, Place};
-use crate::frame::{Enu, Geodetic, LocalEnu, Point, Site, Vector};
+use crate::frame::{Ellipse, Enu, Geodetic, LocalEnu, Point, Site, Vector};
 use crate::matching::{Pair, assign};
 
 /// Map and truth in one local frame, with what became of every object.
@@ -309,7 +309,7 @@ fn pairs_within(
 }
 
 /// Whether two classes can be the same: one that is not given agrees with all.
-fn agree(a: &Option<String>, b: Option<&str>) -> bool {
+pub(crate) fn agree(a: &Option<String>, b: Option<&str>) -> bool {
     match (a, b) {
         (Some(a), Some(b)) => a == b,
         _ => true,
@@ -321,7 +321,7 @@ fn planar(place: Point<Enu>) -> [f64; 2] {
 }
 
 /// A place at the height of the site's origin, so that distances are horizontal.
-fn at_height(site: &Site, place: Geodetic) -> Point<Enu> {
+pub(crate) fn at_height(site: &Site, place: Geodetic) -> Point<Enu> {
     let height_m = site.origin().height_m;
     let at = site.enu(Geodetic { height_m, ..place });
     // Beyond a site's reach the tangent plane folds back on itself, and a place on the far side of
@@ -335,16 +335,21 @@ fn at_height(site: &Site, place: Geodetic) -> Point<Enu> {
     Point::new(at.xyz.x * scale, at.xyz.y * scale, 0.0)
 }
 
+/// The covariance over the site's (east, north) of an ellipse at a place, m^2.
+pub(crate) fn spread(site: &Site, place: Geodetic, ellipse: Ellipse) -> Matrix2<f64> {
+    let (sin, cos) = ellipse.azimuth.sin_cos();
+    let turned = site.enu_from_local(place) * Vector::<LocalEnu>::new(sin, cos, 0.0);
+    let along = turned.xyz.xy().normalize();
+    let across = Vector2::new(along.y, -along.x);
+    along * along.transpose() * ellipse.sigma_major_m.powi(2)
+        + across * across.transpose() * ellipse.sigma_minor_m.powi(2)
+}
+
 fn placed(site: &Site, estimate: &Estimate, options: &Options) -> ComparedEstimate {
     let place = at_height(site, estimate.place);
-    let covariance = estimate.ellipse.map(|ellipse| {
-        let (sin, cos) = ellipse.azimuth.sin_cos();
-        let turned = site.enu_from_local(estimate.place) * Vector::<LocalEnu>::new(sin, cos, 0.0);
-        let along = turned.xyz.xy().normalize();
-        let across = Vector2::new(along.y, -along.x);
-        along * along.transpose() * ellipse.sigma_major_m.powi(2)
-            + across * across.transpose() * ellipse.sigma_minor_m.powi(2)
-    });
+    let covariance = estimate
+        .ellipse
+        .map(|ellipse| spread(site, estimate.place, ellipse));
     ComparedEstimate {
         outcome: match estimate.p_exist {
             Some(p) if p < options.min_exist => EstimateOutcome::Doubtful,

@@ -25,6 +25,7 @@ pub use association::{Association, associate};
 pub use comparison::{
     ComparedEstimate, ComparedTruth, Comparison, EstimateOutcome, Match, TruthOutcome,
 };
+pub(crate) use comparison::{agree, at_height, spread};
 pub use consistency::{Consistency, Existence, ReliabilityBin};
 pub use map::{Estimate, RockMap, map_from_bytes, read_map};
 pub use picture::picture;

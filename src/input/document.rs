@@ -6,6 +6,7 @@ use std::cell::RefCell;
 use toml_edit::{Item, TableLike, Value};
 
 use super::Section;
+use super::asked::Asked;
 use crate::error::{Fault, Place};
 
 /// A parsed file of keys and values, with the command line's overrides laid over it.
@@ -14,6 +15,7 @@ pub struct Document {
     pub(super) file: String,
     pub(super) root: Node,
     pub(super) faults: RefCell<Vec<Fault>>,
+    pub(super) asked: RefCell<Vec<Asked>>,
 }
 
 /// A value and where it stands.
@@ -74,6 +76,7 @@ impl Document {
             file: shown.to_owned(),
             root: table_node(text, shown, parsed.as_table(), Place::file(shown)),
             faults: RefCell::default(),
+            asked: RefCell::default(),
         })
     }
 
@@ -83,6 +86,7 @@ impl Document {
             file: shown.to_owned(),
             root,
             faults: RefCell::default(),
+            asked: RefCell::default(),
         }
     }
 
@@ -94,6 +98,7 @@ impl Document {
             file: self.file,
             root: self.root.over(base.root),
             faults: self.faults,
+            asked: self.asked,
         }
     }
 
@@ -155,6 +160,11 @@ impl Document {
     /// where a file is read record by record.
     pub fn take_faults(&self) -> Vec<Fault> {
         std::mem::take(&mut *self.faults.borrow_mut())
+    }
+
+    /// The keys that were asked for, each once, in the order of asking.
+    pub fn asked(&self) -> Vec<Asked> {
+        self.asked.borrow().clone()
     }
 
     /// All faults found while reading, in the order of the file.

@@ -4,6 +4,7 @@
 //! The readers of `pose`, `camera`, `detection` and `pipeline` stand on these, so that all of them
 //! report a fault in the same words.
 
+mod asked;
 mod document;
 mod head;
 mod json;
@@ -16,6 +17,7 @@ mod vicar;
 mod xml;
 mod yaml;
 
+pub use asked::{Asked, Interval, Takes};
 pub use document::Document;
 pub(crate) use head::{first_character, image_id_of, text};
 pub use reject::{Reason, Reject};

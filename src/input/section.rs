@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::fmt::Display;
 use std::ops::RangeBounds;
 
+use super::asked::{Asked, Interval, Takes};
 use super::document::{Document, Kind, Node};
 use crate::error::{Fault, Place, suggestion};
 
@@ -77,6 +78,16 @@ impl<'a> Section<'a> {
         self.document.faults.borrow_mut().push(fault);
     }
 
+    /// Notes what a key may hold; what is said last counts.
+    fn ask(&self, key: &str, takes: Takes) {
+        let path = self.path_of(key);
+        let mut asked = self.document.asked.borrow_mut();
+        match asked.iter_mut().find(|a| a.path == path) {
+            Some(earlier) => earlier.takes = takes,
+            None => asked.push(Asked { path, takes }),
+        }
+    }
+
     fn take<T>(
         &self,
         key: &str,
@@ -93,6 +104,7 @@ impl<'a> Section<'a> {
 
     /// Text.
     pub fn text(&self, key: &str) -> Option<String> {
+        self.ask(key, Takes::Text);
         self.take(key, "text", |n| match &n.kind {
             Kind::Text(t) => Some(t.clone()),
             _ => None,
@@ -101,6 +113,7 @@ impl<'a> Section<'a> {
 
     /// Text, or a list of texts.
     pub fn texts(&self, key: &str) -> Option<Vec<String>> {
+        self.ask(key, Takes::Texts);
         let text = |n: &Node| match &n.kind {
             Kind::Text(t) => Some(t.clone()),
             _ => None,
@@ -111,8 +124,14 @@ impl<'a> Section<'a> {
         })
     }
 
+    /// Says which texts a key read by [`Section::texts`] may hold; it is for the caller to check them.
+    pub fn offers(&self, key: &str, words: &[&str]) {
+        self.ask(key, Takes::WordList(owned(words)));
+    }
+
     /// One of a few words.
     pub fn word(&self, key: &str, words: &[&str]) -> Option<String> {
+        self.ask(key, Takes::Words(owned(words)));
         let expected = words.join(", ");
         let near = match self.get(key).map(|n| &n.kind) {
             Some(Kind::Text(t)) => suggestion(t, words.iter().copied()),
@@ -129,6 +148,7 @@ impl<'a> Section<'a> {
 
     /// True or false.
     pub fn boolean(&self, key: &str) -> Option<bool> {
+        self.ask(key, Takes::Boolean);
         self.take(key, "true or false", |n| match n.kind {
             Kind::Boolean(b) => Some(b),
             _ => None,
@@ -137,6 +157,7 @@ impl<'a> Section<'a> {
 
     /// A finite number within bounds, which `expected` words.
     pub fn number(&self, key: &str, bounds: impl RangeBounds<f64>, expected: &str) -> Option<f64> {
+        self.ask(key, Takes::Number(Interval::new(&bounds)));
         self.take(key, expected, |n| match n.kind {
             Kind::Number(x) if x.is_finite() && bounds.contains(&x) => Some(x),
             _ => None,
@@ -145,6 +166,7 @@ impl<'a> Section<'a> {
 
     /// A whole number within bounds.
     pub fn integer(&self, key: &str, bounds: std::ops::RangeInclusive<u64>) -> Option<u64> {
+        self.ask(key, Takes::Integer(*bounds.start(), *bounds.end()));
         let expected = format!("a whole number from {} to {}", bounds.start(), bounds.end());
         #[expect(
             clippy::cast_possible_truncation,
@@ -189,6 +211,7 @@ impl<'a> Section<'a> {
 
     /// A list of finite numbers whose length is one of `lengths`.
     pub fn numbers(&self, key: &str, lengths: &[usize]) -> Option<Vec<f64>> {
+        self.ask(key, Takes::Numbers(lengths.to_vec()));
         let counts: Vec<String> = lengths.iter().map(usize::to_string).collect();
         let expected = format!("a list of {} finite numbers", counts.join(" or "));
         self.take(key, expected, |n| match &n.kind {
@@ -205,6 +228,7 @@ impl<'a> Section<'a> {
 
     /// A list of any number of finite numbers.
     pub fn number_list(&self, key: &str) -> Option<Vec<f64>> {
+        self.ask(key, Takes::Numbers(Vec::new()));
         self.take(key, "a list of finite numbers", |n| match &n.kind {
             Kind::List(list) => list
                 .iter()
@@ -224,6 +248,7 @@ impl<'a> Section<'a> {
 
     /// A section below this one; an absent one answers `None` to every key.
     pub fn section(&self, key: &str) -> Section<'a> {
+        self.ask(key, Takes::Table);
         let node = self.take(key, "a table", |n| {
             matches!(n.kind, Kind::Table(_)).then_some(n)
         });
@@ -406,11 +431,15 @@ impl<'a> Section<'a> {
         bounds: impl RangeBounds<f64>,
         number: &str,
     ) -> Option<Result<f64, String>> {
-        if let Some(Kind::Number(_)) = self.get(key).map(|n| &n.kind) {
+        let takes = Takes::NumberOrWord(Interval::new(&bounds), owned(words));
+        let found = if let Some(Kind::Number(_)) = self.get(key).map(|n| &n.kind) {
             let expected = format!("{}, or {number}", words.join(", "));
-            return self.number(key, bounds, &expected).map(Ok);
-        }
-        self.word(key, words).map(Err)
+            self.number(key, bounds, &expected).map(Ok)
+        } else {
+            self.word(key, words).map(Err)
+        };
+        self.ask(key, takes);
+        found
     }
 
     /// Records a fault for every key that was never asked for, with the nearest known one.
@@ -426,4 +455,8 @@ impl<'a> Section<'a> {
             self.problem(key, format!("unknown key{near}"));
         }
     }
+}
+
+fn owned(words: &[&str]) -> Vec<String> {
+    words.iter().map(|&word| word.to_owned()).collect()
 }

@@ -5,7 +5,10 @@ use crate::publish::Format;
 
 /// The map formats, each once; `None` where one is not known.
 pub(super) fn formats(section: &Section<'_>) -> Option<Vec<Format>> {
-    let Some(names) = section.texts("formats") else {
+    let names = section.texts("formats");
+    let known = Format::ALL.map(|format| <[&str; 2]>::from(format.names()));
+    section.offers("formats", known.as_flattened());
+    let Some(names) = names else {
         return Some(vec![Format::GeoJson, Format::GeoPackage]);
     };
     let mut formats: Vec<Format> = Vec::new();

@@ -14,6 +14,7 @@ mod paths;
 mod pictures;
 mod publish;
 mod read;
+mod schema;
 mod stages;
 mod summary;
 
@@ -30,6 +31,7 @@ pub use paths::{DEFAULT_DATA, Source};
 pub use pictures::PictureDigest;
 pub(crate) use publish::may_replace;
 pub use read::{Inputs, read};
+pub use schema::schema;
 pub use stages::{Clock, Ground, Settings};
 pub use summary::{FileCount, Stage, Summary};
 

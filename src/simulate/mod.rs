@@ -72,6 +72,18 @@ impl Simulation {
 pub fn simulate(scene: &Scene) -> Simulation {
     let ground = Ground::new(&scene.site, &scene.ground, scene.seed);
     let rocks = rocks::scatter(scene, &ground);
+    play(scene, ground, rocks)
+}
+
+/// Another night at a scene that has been played: the same ground with these rocks on it, and pose
+/// errors and detections of their own by `seed`.
+pub fn revisit(simulation: &Simulation, rocks: Vec<Rock>, seed: u64) -> Simulation {
+    let mut scene = simulation.scene.clone();
+    scene.seed = seed;
+    play(&scene, simulation.ground, rocks)
+}
+
+fn play(scene: &Scene, ground: Ground, rocks: Vec<Rock>) -> Simulation {
     let views = traverse::traverse(scene, &ground);
     let (detections, n_visible) = detector::detect(scene, &ground, &rocks, &views);
     Simulation {

@@ -23,7 +23,7 @@ pub use view::ViewConfig;
 
 use super::paths::Paths;
 use crate::error::{Error, Fault};
-use crate::input::{Document, Section};
+use crate::input::{Asked, Document, Section};
 use crate::pose::{HeadingReference, North};
 
 /// A checked pipeline file.
@@ -82,6 +82,18 @@ impl Config {
             Some(config) if faults.is_empty() => Ok(config),
             _ => Err(Error::Faults(faults)),
         }
+    }
+
+    /// Every key a pipeline file may have, as the reader asks for it.
+    pub(super) fn keys() -> Vec<Asked> {
+        // Tables that are read only where they are present are present here.
+        let probe = "[site]\norigin = { lat_deg = 0, lon_deg = 0 }\n";
+        let Ok(document) = Document::parse(probe, "probe") else {
+            return Vec::new();
+        };
+        let here = Path::new("pipeline.toml");
+        Self::sections(&document.root(), here, &Overrides::default());
+        document.asked()
     }
 
     fn sections(root: &Section<'_>, path: &Path, overrides: &Overrides) -> Option<Self> {

@@ -45,9 +45,32 @@ pub(super) fn rules(layer: &Layer) -> Vec<Rule> {
         "footprints" => one(footprint(layer.features.len())),
         "views" => one(view(layer.features.len())),
         "traverse" => one(Symbol::way(INK, 0.5)),
+        "compare" => changes(),
         "detections" => one(Symbol::sign("circle", AMBER, 1.6, None)),
         _ => Vec::new(),
     }
+}
+
+/// What became of an object between two maps.
+fn changes() -> Vec<Rule> {
+    let statuses = ["same", "moved", "new", "gone", "unseen"];
+    // What stayed is quiet; what changed is not.
+    let colours = [
+        GREY,
+        CLASSES[4],
+        CLASSES[2],
+        CLASSES[0],
+        (200, 200, 200, 255),
+    ];
+    let rules = statuses
+        .into_iter()
+        .zip(colours)
+        .map(|(status, colour)| Rule {
+            label: status.to_owned(),
+            filter: format!("\"status\" = {}", literal(status)),
+            symbol: Symbol::sign("circle", colour, 2.4, None),
+        });
+    rules.collect()
 }
 
 /// How opaque a layer is as a whole: where many footprints lie, what is under them still shows.
