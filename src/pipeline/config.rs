@@ -155,6 +155,8 @@ pub struct OutputConfig {
     pub formats: Vec<Format>,
     /// Whether pictures are annotated.
     pub annotate: bool,
+    /// Whether report.html is written.
+    pub report: bool,
     /// Whether every detection is written by itself too.
     pub detections: bool,
 }
@@ -415,6 +417,7 @@ fn output(section: Section<'_>, path: &Path, overrides: &Overrides) -> Option<Ou
         dir: overrides.out.clone().unwrap_or(dir),
         formats: formats.clone().unwrap_or_default(),
         annotate: section.boolean("annotate").unwrap_or(true),
+        report: section.boolean("report").unwrap_or(true),
         detections: section.boolean("detections").unwrap_or(false),
     };
     section.finish();

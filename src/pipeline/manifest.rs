@@ -33,9 +33,9 @@ pub(super) fn run_json(
     run_id: &str,
     summary: &Summary,
     outputs: &[String],
-) -> String {
+) -> Value {
     let origin = inputs.site.origin();
-    let manifest = json!({
+    json!({
         "run_id": run_id,
         "program": "rockmap",
         "version": VERSION,
@@ -62,8 +62,7 @@ pub(super) fn run_json(
         "outputs": outputs,
         "warnings": summary.warnings,
         "solver": fusion.map(|f| &f.solver),
-    });
-    pretty(&manifest)
+    })
 }
 
 /// timing.json.
@@ -71,6 +70,7 @@ pub(super) fn timing_json(stages: &[Stage], threads: usize) -> String {
     pretty(&json!({ "threads": threads, "stages": stages }))
 }
 
-fn pretty(value: &Value) -> String {
+/// A JSON file.
+pub(super) fn pretty(value: &Value) -> String {
     format!("{value:#}\n")
 }

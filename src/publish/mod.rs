@@ -16,6 +16,7 @@ pub mod layer;
 mod layers;
 pub mod picture;
 pub mod qgis;
+pub mod report;
 mod rock;
 mod scene;
 mod simple;
