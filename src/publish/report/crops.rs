@@ -240,7 +240,7 @@ fn wanted(
         Some(b) => {
             let centre = Pixel::new(0.5 * (b.x_min + b.x_max), 0.5 * (b.y_min + b.y_max));
             let offset = (place.u - centre.u).abs().max((place.v - centre.v).abs());
-            (centre, (0.8 * b.width().max(b.height())).max(offset + 6.0))
+            (centre, (0.8 * b.width().max(b.height())).max(offset + 14.0))
         }
         None => (place, 1.6 * radius),
     };

@@ -51,6 +51,7 @@ function byId(id) {
 function digits(x, n = 3) {
   if (x === null || x === undefined || Number.isNaN(x)) return "\u2013";
   if (Number.isInteger(x) && Math.abs(x) < 1e9) return x.toLocaleString("en");
+  if (Math.abs(x) >= 1000 && Math.abs(x) < 1e6) return x.toLocaleString("en", { maximumSignificantDigits: n }).replace("-", "\u2212");
   const text = Math.abs(x) >= 1e-4 && Math.abs(x) < 1e6 ? String(Number(x.toPrecision(n))) : x.toExponential(n - 1);
   return text.replace("-", "\u2212");
 }

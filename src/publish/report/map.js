@@ -1,7 +1,7 @@
 // The map: east to the right, north up, metres to pixels by one scale.
 
 // The 8 steps a value from 0 to 1 is coloured by, from doubtful to sure (after viridis).
-const RAMP = ["#fde725", "#a0da39", "#4ac16d", "#1fa187", "#277f8e", "#365c8d", "#46327e", "#440154"];
+const RAMP = ["#d8a200", "#9aa800", "#4a9e3f", "#1c8f74", "#22738a", "#31558a", "#41307a", "#40014f"];
 const RAMP_DARK = ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
 const CLASS_COLOURS = ["#b5482a", "#2f6fab", "#5b8c2a", "#8d4fa3", "#b98a1a", "#2b8f8a", "#a33b5f", "#6d6d6d"];
 // More points than this in view are drawn as dots into a raster.

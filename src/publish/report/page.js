@@ -102,7 +102,7 @@ const map = new RockMap(byId("map"));
 function choose(i, is_centred = false) {
   map.chosen = i;
   showRock(i);
-  byId("said").textContent = i < 0 ? "" : `${ROCKS.id[i]}: ${digits(ROCKS.n_views[i])} views saw it`;
+  byId("said").textContent = i < 0 ? "" : `${ROCKS.id[i]}: seen by ${ROCKS.n_views[i] === 1 ? "1 view" : `${digits(ROCKS.n_views[i])} views`}`;
   if (i >= 0) byId("find-id").value = ROCKS.id[i];
   if (i >= 0 && is_centred) {
     const [px, py] = map.pixelOf(ROCKS.east_m[i], ROCKS.north_m[i]);
@@ -113,6 +113,13 @@ function choose(i, is_centred = false) {
 
 function step(by) {
   if (N_ROCKS > 0) choose(map.chosen < 0 ? (by > 0 ? 0 : N_ROCKS - 1) : (map.chosen + by + N_ROCKS) % N_ROCKS, true);
+}
+
+// By keys and buttons: about the chosen rock where it is in view, so that it stays there.
+function zoom(factor) {
+  const at = map.chosen < 0 ? [] : map.pixelOf(ROCKS.east_m[map.chosen], ROCKS.north_m[map.chosen]);
+  const is_in_view = at.length === 2 && at[0] > 0 && at[1] > 0 && at[0] < map.width && at[1] < map.height;
+  map.zoom(factor, ...(is_in_view ? at : []));
 }
 
 function layerBoxes() {
@@ -219,7 +226,7 @@ function keys() {
   const move = 80;
   const does = {
     ArrowLeft: () => map.pan(move, 0), ArrowRight: () => map.pan(-move, 0), ArrowUp: () => map.pan(0, move), ArrowDown: () => map.pan(0, -move),
-    "+": () => map.zoom(1.4), "=": () => map.zoom(1.4), "-": () => map.zoom(1 / 1.4), 0: () => map.fit(), Home: () => map.fit(),
+    "+": () => zoom(1.4), "=": () => zoom(1.4), "-": () => zoom(1 / 1.4), 0: () => map.fit(), Home: () => map.fit(),
     n: () => step(1), p: () => step(-1), Enter: () => choose(map.nearest()), Escape: () => choose(-1),
   };
   map.canvas.addEventListener("keydown", (event) => {
@@ -231,8 +238,8 @@ function keys() {
 }
 
 function controls() {
-  byId("zoom-in").addEventListener("click", () => map.zoom(1.6));
-  byId("zoom-out").addEventListener("click", () => map.zoom(1 / 1.6));
+  byId("zoom-in").addEventListener("click", () => zoom(1.6));
+  byId("zoom-out").addEventListener("click", () => zoom(1 / 1.6));
   byId("fit").addEventListener("click", () => map.fit());
   byId("next").addEventListener("click", () => step(1));
   byId("previous").addEventListener("click", () => step(-1));
@@ -267,6 +274,7 @@ keys();
 controls();
 // The map is drawn first; what lies below the fold follows.
 requestAnimationFrame(() => setTimeout(() => {
+  performance.mark("map drawn");
   distributions();
   coverageCharts();
   poses();

@@ -49,7 +49,7 @@ function facts(i) {
   say("Diameter", metres(ROCKS.diameter_m[i]));
   say("Latitude", `${ROCKS.lat_deg[i].toFixed(8)}\u00b0`);
   say("Longitude", `${ROCKS.lon_deg[i].toFixed(8)}\u00b0`);
-  say("Height", `${ROCKS.height_m[i].toFixed(2)} m`);
+  say("Height", `${(Math.round(100 * ROCKS.height_m[i]) / 100 + 0).toFixed(2)} m`);
   say("East, north", `${ROCKS.east_m[i].toFixed(3)}, ${ROCKS.north_m[i].toFixed(3)} m`);
   say("1-sigma ellipse", `${metres(ROCKS.sigma_major_m[i])} \u00d7 ${metres(ROCKS.sigma_minor_m[i])}, long axis ${digits(ROCKS.sigma_az_deg[i])}\u00b0 from north`);
   const n_missed = ROCKS.misses[i + 1] - ROCKS.misses[i];
@@ -90,7 +90,7 @@ function cropFigure(i, crop) {
     ? make("a", { href: path.split("/").map(encodeURIComponent).join("/"), target: "_blank", rel: "noopener" }, image_id)
     : image_id;
   return make("figure", {}, cropPicture(crop, said),
-    make("figcaption", {}, name, make("br"), crop.detection === null ? "missed" : `${digits(residual)} px \u00b7 ${digits(DETECTIONS.range_m[crop.detection])} m away`));
+    make("figcaption", {}, name, make("br"), crop.detection === null ? "missed" : `${digits(residual)} px off \u00b7 ${digits(DETECTIONS.range_m[crop.detection])} m`));
 }
 
 // Pixels of the picture are the units of the drawing; a pixel's middle has whole coordinates.
