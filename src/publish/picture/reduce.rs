@@ -56,7 +56,8 @@ mod tests {
 
     #[test]
     fn pixels_are_means_of_those_they_stand_for() {
-        let picture = Picture::from_fn(8, 4, |x, y| [(10 * x) as u8, (10 * y) as u8, 7]).unwrap();
+        let tens = |i: u32| u8::try_from(10 * i).unwrap();
+        let picture = Picture::from_fn(8, 4, |x, y| [tens(x), tens(y), 7]).unwrap();
         let half = picture.reduced(0, 0, 8, 4, 4).unwrap();
         assert_eq!((half.width(), half.height()), (4, 2));
         assert_eq!(half.colour(0, 0), Some([5, 5, 7]));

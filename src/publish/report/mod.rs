@@ -1,7 +1,7 @@
 //! report.html: one page that opens without a network and shows what each rock rests on.
 //!
 //! The data stand in the page as JSON; columns with an entry a rock, a detection or a view are
-//! [packed](packed::Packed). Style and scripts are files of their own beside this one, put into
+//! packed as little-endian bytes in base64. Style and scripts are files of their own beside this one, put into
 //! the page as they stand.
 
 mod charts;
@@ -22,8 +22,9 @@ const PAGE: &str = include_str!("report.html");
 /// Its style.
 const STYLE: &str = include_str!("report.css");
 /// Its scripts, in the order in which they stand in the page.
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 6] = [
     include_str!("data.js"),
+    include_str!("grid.js"),
     include_str!("map.js"),
     include_str!("rock.js"),
     include_str!("charts.js"),

@@ -91,7 +91,7 @@ impl Field {
             Planet::EARTH,
             Geodetic::from_degrees(-24.45, -69.93, 1000.0),
         );
-        let columns = f64::from(rocks.max(1)).sqrt().ceil() as u32;
+        let columns = rocks.saturating_sub(1).isqrt() + 1;
         let view_columns = columns.div_ceil(10);
         let view_rows = rocks.div_ceil(columns).div_ceil(10);
         let views = (0..view_columns * view_rows).map(|i| view(&site, i, view_columns));
