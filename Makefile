@@ -42,6 +42,7 @@ demo: deps ## Simulate a traverse, map it, and say which files to open
 	@echo
 	@echo 'Open'
 	@echo '  outputs/demo/rockmap.qgz                the map in QGIS, styled'
+	@echo '  outputs/demo/report.html                the map in a browser, with what every rock rests on'
 	@echo '  outputs/demo/rocks.geojson              every rock once, for any other GIS'
 	@echo '  outputs/demo/ellipses.geojson           where each rock lies with 95 % probability'
 	@echo '  outputs/demo/annotated/                 the map drawn back into every picture'
@@ -67,7 +68,7 @@ docs: deps tools ## Build the book into docs/book and the library's reference
 	.ci/links
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --release --no-deps
 
-acceptance: demo ## Open the demo's files with GDAL, GeoPandas and QGIS; run the real data that is at hand
+acceptance: demo ## Open the demo's files with GDAL, GeoPandas, QGIS and Chromium; run the real data that is at hand
 	@.ci/acceptance
 
 clean: ## Remove what was built and what runs have written

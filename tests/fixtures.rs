@@ -2,7 +2,8 @@
 //!
 //! A case is a folder with a `pipeline.toml`, its inputs and an `expected/` folder. Numbers must
 //! agree within the tolerances below, pictures by their perceptual difference, everything else
-//! exactly. `rockmap.gpkg` and `rockmap.qgz` are not compared here: their own tests open them.
+//! exactly. `rockmap.gpkg`, `rockmap.qgz` and `report.html` are not compared here: their own tests
+//! open them.
 //! `ROCKMAP_RENEW=1` writes the expected outputs anew; read the difference before you
 //! commit it.
 
@@ -64,7 +65,7 @@ fn run(case: &Path) -> Vec<String> {
     if let Err(error) = done {
         return vec![format!("{name}: {error}")];
     }
-    for passing in ["timing.json", "rockmap.gpkg", "rockmap.qgz"] {
+    for passing in ["timing.json", "rockmap.gpkg", "rockmap.qgz", "report.html"] {
         fs::remove_file(out.join(passing)).unwrap();
     }
     let expected = case.join("expected");

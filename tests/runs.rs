@@ -320,6 +320,72 @@ fn residuals_px(run: &Run) -> Vec<f64> {
     all
 }
 
+/// The data in report.html.
+fn report_data(run: &Run) -> Value {
+    let page = fs::read_to_string(run.out().join("report.html")).unwrap();
+    let (_, data) = page.split_once("id=\"data\">").unwrap();
+    serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap()
+}
+
+/// Every detection of evidence.csv has a crop in which the rock is where the residual says, and
+/// nearly everywhere within 3 px of the mark; the photographs show a few targets in doubt.
+fn crops_agree_with_evidence(run: &Run) {
+    let data = report_data(run);
+    let crops = data["crops"].as_array().unwrap();
+    let mut offsets: Vec<f64> = Vec::new();
+    for crop in crops.iter().filter(|c| !c["detection"].is_null()) {
+        let number = |value: &Value| value.as_f64().unwrap();
+        let (place, mark) = (&crop["place_px"], &crop["mark_px"]);
+        let across = number(&place[0]) - 0.5 * (number(&mark[0]) + number(&mark[2]));
+        let down = number(&place[1]) - 0.5 * (number(&mark[1]) + number(&mark[3]));
+        offsets.push(across.hypot(down));
+        let inside = |at: &Value, start: &Value, length: &Value| {
+            let (at, start) = (number(at), number(start));
+            at >= start && at <= start + number(length)
+        };
+        assert!(inside(&place[0], &crop["column"], &crop["width"]), "{crop}");
+        assert!(inside(&place[1], &crop["row"], &crop["height"]), "{crop}");
+        // JPEG begins with ff d8 ff.
+        assert!(crop["jpeg"].as_str().unwrap().starts_with("/9j/"));
+    }
+    offsets.sort_by(f64::total_cmp);
+    let residuals = residuals_px(run);
+    assert_eq!(offsets.len(), residuals.len());
+    for (offset, residual) in offsets.iter().zip(&residuals) {
+        assert!((offset - residual).abs() < 0.02, "{offset} {residual}");
+    }
+    let near = offsets.iter().filter(|o| **o <= 3.0).count();
+    assert!(
+        near * 10 >= offsets.len() * 9,
+        "{near} of {}",
+        offsets.len()
+    );
+}
+
+#[test]
+fn a_run_without_a_report_or_pictures() {
+    let run = Run::of(
+        "fixtures/tiny/pipeline.toml",
+        None,
+        &["output.report=false"],
+    );
+    assert!(!run.out().join("report.html").exists());
+    let outputs = run.json("run.json")["outputs"].to_string();
+    assert!(!outputs.contains("report.html"), "{outputs}");
+
+    let run = Run::of(
+        "fixtures/tiny/pipeline.toml",
+        None,
+        &["output.annotate=false"],
+    );
+    let data = report_data(&run);
+    assert_eq!(data["manifest"]["run_id"], run.json("run.json")["run_id"]);
+    let rocks = data["rocks"]["id"].as_array().unwrap().len();
+    assert_eq!(Some(rocks), run.summary.n_objects);
+    let pictures = data["views"]["picture"].as_array().unwrap();
+    assert!(pictures.iter().all(Value::is_null));
+}
+
 #[test]
 fn kite_photographs_of_ground_targets() {
     let Some(data) = real("copr-kite") else {
@@ -329,6 +395,7 @@ fn kite_photographs_of_ground_targets() {
         let run = Run::of("pipelines/copr-kite.toml", Some(&data), &[method]);
         run.is_accounted_for();
         assert_eq!(run.summary.n_annotated, 38);
+        crops_agree_with_evidence(&run);
         let residuals = residuals_px(&run);
         assert!(residuals.len() >= 57 && residuals[residuals.len() / 2] < 3.0);
         let sources = rockmap::evaluate::Sources {

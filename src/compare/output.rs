@@ -49,7 +49,11 @@ pub fn layer(changes: &Changes, before: &Epoch, after: &Epoch) -> Layer {
         } else {
             format!("a:{id}")
         };
-        (id, Some(Geometry::Point(lon_lat(place, before.map.planet))), (change, ends))
+        (
+            id,
+            Some(Geometry::Point(lon_lat(place, before.map.planet))),
+            (change, ends),
+        )
     });
     let about = (
         "compare",

@@ -10,9 +10,7 @@ use crate::adjust::{Measurement, Problem, Surface};
 use crate::error::Error;
 use crate::frame::{RigidTransform, Vector};
 use crate::fuse::belief::{Belief, BeliefSettings, Drift, fuse_belief};
-use crate::fuse::{
-    Fusion, MixtureSettings, Object, Observation, Weights, fuse_mixture,
-};
+use crate::fuse::{Fusion, MixtureSettings, Object, Observation, Weights, fuse_mixture};
 use crate::input::Reject;
 use crate::pose::PoseSigma;
 use crate::project::{Hit, Miss, Placed, diameter_m};
@@ -51,12 +49,7 @@ pub fn map(
 }
 
 /// Fuses the detections on the ground by a mixture.
-fn mixture(
-    config: &Config,
-    ground: &Ground,
-    weights: Weights,
-    observer: &dyn Observer,
-) -> Fusion {
+fn mixture(config: &Config, ground: &Ground, weights: Weights, observer: &dyn Observer) -> Fusion {
     observer.begin("fuse", None);
     let observations: Vec<Observation> = ground
         .placed
@@ -117,7 +110,13 @@ fn believed(
     let (placed, misses, number) = place(config, inputs, &measured, &belief);
     let mut ground = clock.stage("footprint", || {
         let misses = [measured.misses.clone(), misses].concat();
-        Ok(stages::footprint(config, inputs, (placed, misses), Some(views), observer))
+        Ok(stages::footprint(
+            config,
+            inputs,
+            (placed, misses),
+            Some(views),
+            observer,
+        ))
     })?;
     ground.classes = measured.classes;
     let fusion = fusion(config, belief, &number);

@@ -34,11 +34,11 @@ pub(super) fn run_json(
     run_id: &str,
     summary: &Summary,
     outputs: &[String],
-) -> String {
+) -> Value {
     let origin = inputs.site.origin();
     let (lat_deg, lon_deg) = inputs.site.planet().lat_lon_deg(origin);
     let datum = inputs.datum.as_ref();
-    let manifest = json!({
+    json!({
         "run_id": run_id,
         "program": "rockmap",
         "version": VERSION,
@@ -66,8 +66,7 @@ pub(super) fn run_json(
         "outputs": outputs,
         "warnings": summary.warnings,
         "solver": fusion.map(solver),
-    });
-    pretty(&manifest)
+    })
 }
 
 /// timing.json.
@@ -75,7 +74,8 @@ pub(super) fn timing_json(stages: &[Stage], threads: usize) -> String {
     pretty(&json!({ "threads": threads, "stages": stages }))
 }
 
-fn pretty(value: &Value) -> String {
+/// A JSON file.
+pub(super) fn pretty(value: &Value) -> String {
     format!("{value:#}\n")
 }
 

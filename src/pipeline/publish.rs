@@ -7,13 +7,14 @@ use rayon::prelude::*;
 
 use super::Observer;
 use super::config::Config;
-use super::manifest::{run_json, timing_json};
+use super::manifest::{pretty, run_json, timing_json};
 use super::read::Inputs;
 use super::stages::{Clock, Ground};
 use super::summary::Summary;
 use crate::error::{Error, Fault, Place};
 use crate::fuse::Fusion;
 use crate::input::Reject;
+use crate::publish::report::{self, CropPlan, CutCrop};
 use crate::publish::{
     Folder, Format, Layer, Picture, Product, Rock, Scene, annotate, qgis, reject_table, stac, table,
 };
@@ -45,6 +46,7 @@ pub(super) struct Map<'a> {
     fusion: Option<&'a Fusion>,
     scene: Scene<'a>,
     rocks: Vec<Rock>,
+    crops: CropPlan,
     run_id: String,
 }
 
@@ -53,7 +55,16 @@ pub(super) struct Map<'a> {
 pub(super) struct Written {
     files: Vec<String>,
     n_annotated: usize,
+    /// Pieces of pictures for the report.
+    crops: Vec<CutCrop>,
     warnings: Vec<String>,
+}
+
+/// What was made of a picture.
+#[derive(Default)]
+struct Handled {
+    is_annotated: bool,
+    crops: Vec<CutCrop>,
 }
 
 impl<'a> Map<'a> {
@@ -68,6 +79,9 @@ impl<'a> Map<'a> {
         let mut map = Self::single_view(config, inputs, ground, run_id);
         map.rocks = map.scene.rock_map(fusion);
         map.fusion = Some(fusion);
+        if config.output.report {
+            map.crops = CropPlan::new(&map.scene, &map.rocks);
+        }
         map
     }
 
@@ -85,6 +99,7 @@ impl<'a> Map<'a> {
             fusion: None,
             scene: ground.scene(config, inputs),
             rocks: Vec::new(),
+            crops: CropPlan::empty(),
             run_id,
         }
     }
@@ -99,21 +114,22 @@ impl<'a> Map<'a> {
             files.push(product.name);
         }
         let warnings = Mutex::new(Vec::new());
-        let drawn: Vec<bool> = pictures
+        let handled: Vec<Handled> = pictures
             .par_iter()
             .map(|&(view, picture)| {
-                let drawn = self.annotate(folder, view, picture, &warnings);
+                let handled = self.handle(folder, view, picture, &warnings);
                 observer.step();
-                drawn
+                handled
             })
             .collect::<Result<_, Error>>()?;
         let mut warnings: Vec<String> = warnings.into_inner().unwrap_or_default();
         warnings.sort();
-        let n_annotated = drawn.iter().filter(|d| **d).count();
+        let n_annotated = handled.iter().filter(|h| h.is_annotated).count();
         observer.end(&format!("{n_annotated} pictures annotated"));
         Ok(Written {
             files,
             n_annotated,
+            crops: handled.into_iter().flat_map(|h| h.crops).collect(),
             warnings,
         })
     }
@@ -185,25 +201,31 @@ impl<'a> Map<'a> {
         Some(Product::new("stac.json", stac::text(&item)?))
     }
 
-    /// The views whose pictures are drawn, each with its picture.
+    /// The views whose pictures are looked at, each with its picture.
     fn pictures(&self) -> Vec<(usize, &View)> {
-        let wanted = self.fusion.is_some() && self.config.output.annotate;
         let views = self.inputs.views.iter().enumerate();
         views
-            .filter(|(_, view)| wanted && view.picture.is_some() && view.camera.is_some())
+            .filter(|&(index, view)| self.is_annotated(view) || self.crops.needs(index))
             .collect()
     }
 
-    /// Draws one picture; one that cannot be decoded costs a warning.
-    fn annotate(
+    /// Whether the picture of a view is to be drawn.
+    fn is_annotated(&self, view: &View) -> bool {
+        let wanted = self.fusion.is_some() && self.config.output.annotate;
+        wanted && view.picture.is_some() && view.camera.is_some()
+    }
+
+    /// Cuts what the report needs from one picture, and draws it; one that cannot be decoded costs
+    /// a warning.
+    fn handle(
         &self,
         folder: &Folder,
         index: usize,
         view: &View,
         warnings: &Mutex<Vec<String>>,
-    ) -> Result<bool, Error> {
+    ) -> Result<Handled, Error> {
         let Some(source) = &view.picture else {
-            return Ok(false);
+            return Ok(Handled::default());
         };
         let mut picture = match Picture::read(&source.path, &source.name) {
             Ok(picture) => picture,
@@ -211,13 +233,51 @@ impl<'a> Map<'a> {
                 if let Ok(mut warnings) = warnings.lock() {
                     warnings.push(format!("image {}: {error}", view.image_id));
                 }
-                return Ok(false);
+                return Ok(Handled::default());
             }
         };
-        annotate(&mut picture, &self.scene.annotation_of(index, &self.rocks));
-        let path = folder.path_of(&Path::new("annotated").join(drawn_name(&source.name)))?;
-        picture.write(&path, Picture::JPEG_QUALITY)?;
-        Ok(true)
+        let crops = self.crops.cut(index, &picture);
+        let is_annotated = self.is_annotated(view);
+        if is_annotated {
+            annotate(&mut picture, &self.scene.annotation_of(index, &self.rocks));
+            let path = folder.path_of(&Path::new("annotated").join(drawn_name(&source.name)))?;
+            picture.write(&path, Picture::JPEG_QUALITY)?;
+        }
+        Ok(Handled {
+            is_annotated,
+            crops,
+        })
+    }
+
+    /// report.html, which says of the run what run.json does.
+    fn report(
+        &self,
+        manifest: &serde_json::Value,
+        rejects: &[Reject],
+        crops: &[CutCrop],
+    ) -> Product {
+        let annotated = |view: &View| {
+            let source = view.picture.as_ref().filter(|_| self.is_annotated(view))?;
+            let path = drawn_name(&source.name);
+            let parts = path.iter().map(|part| part.to_string_lossy());
+            Some(
+                ["annotated".into()]
+                    .into_iter()
+                    .chain(parts)
+                    .collect::<Vec<_>>()
+                    .join("/"),
+            )
+        };
+        let pictures: Vec<Option<String>> = self.inputs.views.iter().map(annotated).collect();
+        let run = report::Run {
+            title: &self.config.site.name,
+            manifest,
+            rejects,
+            pictures: &pictures,
+            plan: &self.crops,
+            crops,
+        };
+        self.scene.report(&self.rocks, &run)
     }
 
     /// Writes what is said of the run itself and puts the folder in its place.
@@ -240,6 +300,8 @@ impl<'a> Map<'a> {
         folder.write(&reject_table(&summary.rejects)?)?;
         let mut outputs = written.files;
         outputs.extend(["rejects.csv", "run.json", "timing.json"].map(str::to_owned));
+        let is_reported = self.fusion.is_some() && self.config.output.report;
+        outputs.extend(is_reported.then(|| "report.html".to_owned()));
         outputs.sort();
         let manifest = run_json(
             self.config,
@@ -249,7 +311,10 @@ impl<'a> Map<'a> {
             &summary,
             &outputs,
         );
-        folder.write(&Product::new("run.json", manifest))?;
+        if is_reported {
+            folder.write(&self.report(&manifest, &summary.rejects, &written.crops))?;
+        }
+        folder.write(&Product::new("run.json", pretty(&manifest)))?;
         let timing = timing_json(&clock.stages, rayon::current_num_threads());
         folder.write(&Product::new("timing.json", timing))?;
         summary.stages = clock.stages;

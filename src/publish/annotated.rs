@@ -78,9 +78,6 @@ impl Scene<'_> {
 
     fn object_marks(&self, view_index: usize, rocks: &[Rock]) -> Vec<ObjectMark> {
         let view = &self.views[view_index];
-        let Some(camera) = &view.camera else {
-            return Vec::new();
-        };
         let concerns = |rock: &&Rock| {
             rock.detected_by.contains(&view_index) || rock.missed_by.contains(&view_index)
         };
@@ -88,13 +85,10 @@ impl Scene<'_> {
             let object = &rock.object;
             let (centre, covariance_px) =
                 project_covariance(view, object.place, &object.covariance)?;
-            let distance_m = view.origin().distance(object.place);
-            let radius_m = rock.diameter_m.map_or(UNKNOWN_RADIUS_M, |d| 0.5 * d);
-            let (_, by_pixel) = camera.ray_with_jacobian(centre).ok()?;
             Some(ObjectMark {
                 label: rock.rock_id.clone(),
                 centre,
-                radius_px: radius_m / (distance_m * by_pixel.direction.column(0).norm()),
+                radius_px: apparent_radius_px(view, rock, centre)?,
                 covariance_px,
                 detected: rock.detected_by.contains(&view_index),
                 p_exist: object.p_exist,
@@ -102,4 +96,13 @@ impl Scene<'_> {
         };
         rocks.iter().filter(concerns).filter_map(mark).collect()
     }
+}
+
+/// How large a rock appears in a view that has it at `centre`, pixels; `None` where the lens does
+/// not see it.
+pub(super) fn apparent_radius_px(view: &View, rock: &Rock, centre: Pixel) -> Option<f64> {
+    let distance_m = view.origin().distance(rock.object.place);
+    let radius_m = rock.diameter_m.map_or(UNKNOWN_RADIUS_M, |d| 0.5 * d);
+    let (_, by_pixel) = view.camera.as_ref()?.ray_with_jacobian(centre).ok()?;
+    Some(radius_m / (distance_m * by_pixel.direction.column(0).norm()))
 }

@@ -17,6 +17,7 @@ pub mod layer;
 mod layers;
 pub mod picture;
 pub mod qgis;
+pub mod report;
 mod rock;
 mod scene;
 mod simple;

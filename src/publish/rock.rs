@@ -60,6 +60,13 @@ pub struct Evidence {
     pub residual_m: f64,
 }
 
+impl Evidence {
+    /// Whether the detection is the rock's rather than another's.
+    pub fn is_firm(&self) -> bool {
+        self.weight >= DETECTED
+    }
+}
+
 /// Names the fused objects and gathers what a map says of each.
 pub(super) fn rocks(scene: &Scene<'_>, objects: &[Object]) -> Vec<Rock> {
     let digits = objects.len().to_string().len().max(4);
@@ -76,7 +83,7 @@ fn rock(scene: &Scene<'_>, object: &Object, rock_id: String) -> Rock {
         .iter()
         .map(|m| evidence(scene, object.place, m.observation, m.weight))
         .collect();
-    let firm: Vec<&Evidence> = evidence.iter().filter(|e| e.weight >= DETECTED).collect();
+    let firm: Vec<&Evidence> = evidence.iter().filter(|e| e.is_firm()).collect();
     let detected_by: BTreeSet<usize> = firm.iter().map(|e| e.view).collect();
     let covering = scene.footprints.views_covering(object.place);
     let missed_by = covering

@@ -153,13 +153,7 @@ impl Factor4 {
 
 /// `a += w h^T m h`, of the first `n` rows.
 #[inline]
-pub(super) fn add_object_information(
-    a: &mut Square4,
-    h: &Square4,
-    m: &Square4,
-    n: usize,
-    w: f64,
-) {
+pub(super) fn add_object_information(a: &mut Square4, h: &Square4, m: &Square4, n: usize, w: f64) {
     for r in 0..n {
         let mut left = [0.0; 4];
         for s in 0..n {

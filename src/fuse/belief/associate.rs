@@ -167,13 +167,23 @@ impl Engine<'_> {
         let candidates = &expectation.candidates;
         let view_of = |i: usize| self.looks[candidates[i].look].view;
         let indices: Vec<usize> = (0..candidates.len()).collect();
-        let by_view: Vec<&[usize]> = indices.chunk_by(|&a, &b| view_of(a) == view_of(b)).collect();
+        let by_view: Vec<&[usize]> = indices
+            .chunk_by(|&a, &b| view_of(a) == view_of(b))
+            .collect();
         let parts: Vec<Vec<f64>> = by_view
             .par_iter()
             .map_init(Exclusive::new, |exclusive, indices| {
                 let view = view_of(indices[0]);
-                let first_pair = indices.iter().map(|&i| candidates[i].pair).min().unwrap_or(0);
-                let last_pair = indices.iter().map(|&i| candidates[i].pair).max().unwrap_or(0);
+                let first_pair = indices
+                    .iter()
+                    .map(|&i| candidates[i].pair)
+                    .min()
+                    .unwrap_or(0);
+                let last_pair = indices
+                    .iter()
+                    .map(|&i| candidates[i].pair)
+                    .max()
+                    .unwrap_or(0);
                 let mut edges = Vec::new();
                 let mut weights = Vec::new();
                 let mut active = Vec::new();

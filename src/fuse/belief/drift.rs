@@ -85,9 +85,13 @@ impl Engine<'_> {
             let pull = jitter.component_mul(&off);
             chain.add(2 * p, &jitter, -pull);
             chain.add(2 * p + 1, &jitter, pull);
-            chain.links.push((2 * p + 1, 2 * p, Matrix6::from_diagonal(&-jitter)));
+            chain
+                .links
+                .push((2 * p + 1, 2 * p, Matrix6::from_diagonal(&-jitter)));
             let before = p.checked_sub(1).map(|q| views[q]);
-            let outside = view.checked_sub(1).filter(|v| before.is_none() && self.is_settled[*v]);
+            let outside = view
+                .checked_sub(1)
+                .filter(|v| before.is_none() && self.is_settled[*v]);
             let own = drift.share * variance;
             let Some(previous) = before.or(outside) else {
                 let information = own.map(|v| 1.0 / v);

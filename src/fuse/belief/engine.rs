@@ -326,8 +326,8 @@ impl<'a> Engine<'a> {
         pull[3] = -away / vs;
         information[0][0] += FAINT;
         information[1][1] += FAINT;
-        let ln_density = -0.5 * height_m * height_m / vz - 0.5 * (2.0 * PI * vz).ln()
-            + self.model.size.ln(x[3]);
+        let ln_density =
+            -0.5 * height_m * height_m / vz - 0.5 * (2.0 * PI * vz).ln() + self.model.size.ln(x[3]);
         Prior {
             information,
             pull,

@@ -31,7 +31,10 @@ impl SmoothGround {
         let bound = |of: fn(&(f64, f64)) -> f64| {
             let values = places.clone().map(move |p| of(&p));
             let low = values.clone().fold(f64::INFINITY, f64::min);
-            (low - MARGIN_M, values.fold(f64::NEG_INFINITY, f64::max) + MARGIN_M)
+            (
+                low - MARGIN_M,
+                values.fold(f64::NEG_INFINITY, f64::max) + MARGIN_M,
+            )
         };
         let ((west_m, east_m), (south_m, north_m)) = (bound(|p| p.0), bound(|p| p.1));
         let (columns, rows) = (count(east_m - west_m)?, count(north_m - south_m)?);

@@ -237,7 +237,10 @@ impl Engine<'_> {
         let total: f64 = sizes.iter().map(|s| s.0).sum();
         if total > 5.0 {
             let mean = sizes.iter().map(|(w, l)| w * l).sum::<f64>() / total;
-            let scatter = sizes.iter().map(|(w, l)| w * (l - mean).powi(2)).sum::<f64>();
+            let scatter = sizes
+                .iter()
+                .map(|(w, l)| w * (l - mean).powi(2))
+                .sum::<f64>();
             self.model.clutter_size.mean = mean;
             self.model.clutter_size.variance =
                 (scatter / total + 0.02).clamp(CLUTTER_VARIANCES.0, CLUTTER_VARIANCES.1);

@@ -125,8 +125,13 @@
 //! | `evidence` | log-odds that each object is real | 3.5 |
 //! | `learn` | noise, clutter, density, sizes, detectability | 3.5 |
 //! | `outcome` | the whole, and what comes of it | 3.7, 3.8 |
+#![allow(
+    clippy::needless_range_loop,
+    reason = "rows and columns of several small matrices are indexed together"
+)]
 
 mod algebra;
+mod associate;
 mod curve;
 mod data;
 mod drift;
@@ -145,13 +150,12 @@ mod pairs;
 mod register;
 mod sequence;
 mod single;
-mod associate;
 mod solve;
 #[cfg(test)]
 mod tests;
 
 pub use drift::Drift;
-pub use outcome::{fuse_belief, Belief, BeliefObject, BeliefEvidence, Single};
+pub use outcome::{Belief, BeliefEvidence, BeliefObject, Single, fuse_belief};
 
 /// How poses are corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

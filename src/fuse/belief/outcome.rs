@@ -4,12 +4,12 @@ use nalgebra::{Matrix3, Matrix6, Vector6};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::BeliefSettings;
 use super::algebra::{Square4, to_matrix6};
 use super::engine::Engine;
 use super::evidence::{Evidence, probability};
 use super::learn::LEAST_VIEWS;
 use super::solve::{Robust, Stepped};
-use super::BeliefSettings;
 use crate::adjust::Problem;
 use crate::frame::{Enu, Point};
 use crate::fuse::Member;
@@ -264,12 +264,7 @@ impl Engine<'_> {
         clutter + objects + poses
     }
 
-    fn outcome(
-        &mut self,
-        problem: &Problem<'_>,
-        rounds: usize,
-        converged: bool,
-    ) -> Belief {
+    fn outcome(&mut self, problem: &Problem<'_>, rounds: usize, converged: bool) -> Belief {
         let stepped = self.last_adjustment();
         self.weigh_background();
         let evidence = self.weigh(self.expectation());

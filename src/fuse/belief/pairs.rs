@@ -119,11 +119,10 @@ impl Engine<'_> {
         for (pairs, candidates) in views {
             let offset = all.pairs.len();
             all.pairs.extend(pairs);
-            all.candidates
-                .extend(candidates.iter().map(|c| Candidate {
-                    pair: c.pair + offset,
-                    ..*c
-                }));
+            all.candidates.extend(candidates.iter().map(|c| Candidate {
+                pair: c.pair + offset,
+                ..*c
+            }));
         }
         all
     }

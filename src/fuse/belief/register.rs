@@ -211,7 +211,10 @@ impl Engine<'_> {
             shift: [0.0; 6],
             cov: *prior,
         };
-        let mut best = (Scoring::new(matches, &none, n_looks).score_of_none(information), none);
+        let mut best = (
+            Scoring::new(matches, &none, n_looks).score_of_none(information),
+            none,
+        );
         let mut scoring = Scoring::new(matches, &none, n_looks);
         let mut first: Vec<(f64, Hypothesis)> = order
             .iter()
@@ -296,7 +299,8 @@ impl<'a> Scoring<'a> {
         self.sums.fill(0.0);
         for (i, m) in self.matches.iter().enumerate() {
             if let Some(factor) = Factor4::new(&self.spread[i], m.n) {
-                let exponent = -0.5 * factor.mahalanobis2(&self.e[i]) - 0.5 * factor.ln_det + m.base;
+                let exponent =
+                    -0.5 * factor.mahalanobis2(&self.e[i]) - 0.5 * factor.ln_det + m.base;
                 self.sums[m.look] += exponent.clamp(-60.0, 60.0).exp();
             }
         }

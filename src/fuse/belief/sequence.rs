@@ -215,8 +215,8 @@ impl Engine<'_> {
                 continue;
             };
             let detection = &self.looks[look];
-            let weight = map.worth[look]
-                * robust_weight(&e, &self.looseness[look], detection.n_rows());
+            let weight =
+                map.worth[look] * robust_weight(&e, &self.looseness[look], detection.n_rows());
             let mut a = [[0.0; 4]; 4];
             super::algebra::add_object_information(&mut a, &h, &m, n, weight);
             for i in 0..4 {
@@ -243,7 +243,9 @@ impl Engine<'_> {
             let looks = moving.iter().flat_map(|&v| self.looks_of(v));
             looks.filter_map(|look| map.own[look]).collect()
         } else {
-            self.looks_of(view).filter_map(|look| map.own[look]).collect()
+            self.looks_of(view)
+                .filter_map(|look| map.own[look])
+                .collect()
         };
         touched.sort_unstable();
         touched.dedup();

@@ -245,9 +245,8 @@ impl Engine<'_> {
                 let range_m = single.range_m.max(0.1);
                 let u = away.map(|a| a / range_m);
                 let c = &single.cov;
-                let along = u[0] * u[0] * c[0][0]
-                    + 2.0 * u[0] * u[1] * c[0][1]
-                    + u[1] * u[1] * c[1][1];
+                let along =
+                    u[0] * u[0] * c[0][0] + 2.0 * u[0] * u[1] * c[0][1] + u[1] * u[1] * c[1][1];
                 let slack = if most_m.is_finite() {
                     along.max(0.0).sqrt().min(0.05 * most_m)
                 } else {
@@ -266,7 +265,8 @@ impl Engine<'_> {
         let mut kept = keep.iter();
         self.looks.retain(|_| kept.next().copied().unwrap_or(true));
         let mut kept = keep.iter();
-        self.singles.retain(|_| kept.next().copied().unwrap_or(true));
+        self.singles
+            .retain(|_| kept.next().copied().unwrap_or(true));
         self.index();
         let all: Vec<f64> = self.looks.iter().filter_map(|l| l.log_px).collect();
         self.model.clutter_size = clutter_size(&all);

@@ -49,7 +49,7 @@ pub(super) struct Stepped {
 pub(super) enum Robust {
     /// As the contaminated normal says.
     Contaminated,
-    /// By Geman and McClure, with this squared scale.
+    /// By Geman and `McClure`, with this squared scale.
     Scale(f64),
 }
 
@@ -210,7 +210,10 @@ impl Engine<'_> {
     }
 
     /// Objects and poses together; the poses move here, the steps of the objects are returned.
-    #[expect(clippy::type_complexity, reason = "steps, and covariances where asked for")]
+    #[expect(
+        clippy::type_complexity,
+        reason = "steps, and covariances where asked for"
+    )]
     fn joint(
         &mut self,
         normal: Normal,
@@ -228,7 +231,13 @@ impl Engine<'_> {
         let solution = if spacing == 1 && 4 * objects.len() < 6 * normal.poses.len() {
             objects_kept(objects, normal.poses, &normal.couplings, marginals)
         } else {
-            poses_kept(objects, normal.poses, normal.links, &normal.couplings, marginals)
+            poses_kept(
+                objects,
+                normal.poses,
+                normal.links,
+                &normal.couplings,
+                marginals,
+            )
         };
         let Some((steps, turns, marginal)) = solution else {
             return (vec![[0.0; 4]; n_objects], None);
@@ -256,7 +265,7 @@ impl Engine<'_> {
     }
 
     /// Covariances of objects as others would see them from these edges, the errors of each pose
-    /// independent: 3.4's C_k.
+    /// independent: `C_k` of 3.4.
     pub(super) fn apart_cov(&self, part: &Part<'_>) -> Vec<Square4> {
         let mut information: Vec<Square4> = part
             .objects
@@ -286,7 +295,6 @@ impl Engine<'_> {
 
     /// A detection's derivatives by the object and the information of its rows, its pose uncertain;
     /// with the residual and the variances of the reading.
-    #[expect(clippy::type_complexity, reason = "parts of one linearisation")]
     pub(super) fn information_of(
         &self,
         look: usize,
@@ -355,7 +363,12 @@ impl Engine<'_> {
     }
 
     /// Gauss-Newton steps of all objects and poses; with marginal covariances of the last if asked.
-    pub(super) fn adjust(&mut self, steps: usize, robust: Robust, marginals: bool) -> Option<Stepped> {
+    pub(super) fn adjust(
+        &mut self,
+        steps: usize,
+        robust: Robust,
+        marginals: bool,
+    ) -> Option<Stepped> {
         let edges = std::mem::take(&mut self.edges);
         let mut objects = std::mem::take(&mut self.objects);
         let of: Vec<(usize, usize)> = edges
@@ -434,12 +447,7 @@ impl Row {
     }
 
     /// Adds to a pose's information; the rows' own is diagonal where poses move.
-    fn add_to_pose(
-        &self,
-        a: &mut SMatrix<f64, 6, 6>,
-        b: &mut Vector6<f64>,
-        toward: &[f64; 4],
-    ) {
+    fn add_to_pose(&self, a: &mut SMatrix<f64, 6, 6>, b: &mut Vector6<f64>, toward: &[f64; 4]) {
         for r in 0..self.n {
             let w = self.information[r][r];
             if w == 0.0 {
@@ -473,13 +481,7 @@ impl Row {
 }
 
 /// Adds `w h^T m h` to the information of a pose.
-pub(super) fn add_pose_information(
-    a: &mut Square6,
-    h: &ByPose,
-    m: &Square4,
-    n: usize,
-    w: f64,
-) {
+pub(super) fn add_pose_information(a: &mut Square6, h: &ByPose, m: &Square4, n: usize, w: f64) {
     for r in 0..n {
         let mut left = [0.0; 6];
         for s in 0..n {
@@ -553,10 +555,10 @@ fn objects_kept(
 }
 
 /// Couplings in an order: numbers are sorted, for the blocks are heavy.
-fn sorted<'a>(
-    couplings: &'a [Coupling],
+fn sorted(
+    couplings: &[Coupling],
     key: impl Fn(&Coupling) -> (usize, usize),
-) -> impl Iterator<Item = &'a Coupling> {
+) -> impl Iterator<Item = &Coupling> {
     let mut order: Vec<((usize, usize), usize)> = couplings
         .iter()
         .enumerate()

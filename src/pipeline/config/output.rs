@@ -21,6 +21,8 @@ pub struct OutputConfig {
     pub formats: Vec<Format>,
     /// Whether pictures are annotated.
     pub annotate: bool,
+    /// Whether report.html is written.
+    pub report: bool,
     /// Whether every detection is written by itself too.
     pub detections: bool,
 }
@@ -42,6 +44,7 @@ pub(super) fn output(
         dir: overrides.out.clone().unwrap_or(dir),
         formats: formats.clone().unwrap_or_default(),
         annotate: section.boolean("annotate").unwrap_or(true),
+        report: section.boolean("report").unwrap_or(true),
         detections: section.boolean("detections").unwrap_or(false),
     };
     section.finish();

@@ -47,21 +47,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
 
 /// Encodes in 4:4:4, with the metadata after the JFIF header.
 pub(super) fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>, String> {
-    let words = |error: turbojpeg::Error| message(&error);
-    let mut compressor = Compressor::new().map_err(words)?;
-    compressor
-        .set_quality(i32::from(quality.clamp(1, 100)))
-        .map_err(words)?;
-    compressor.set_subsamp(Subsamp::None).map_err(words)?;
-    let width = picture.width as usize;
-    let image = Image {
-        pixels: picture.rgba.as_slice(),
-        width,
-        pitch: width * 4,
-        height: picture.height as usize,
-        format: PixelFormat::RGBX,
-    };
-    let plain = compressor.compress_to_owned(image).map_err(words)?;
+    let plain = compress(picture, quality, Subsamp::None, false)?;
     let body = Segments::new(&plain)
         .take_while(|segment| segment.marker == APP0)
         .last()
@@ -74,6 +60,36 @@ pub(super) fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>, String> 
     }
     bytes.extend_from_slice(&plain[body..]);
     Ok(bytes)
+}
+
+/// Encodes in 4:2:0 with Huffman tables of its own, without metadata.
+pub(super) fn encode_small(picture: &Picture, quality: u8) -> Result<Vec<u8>, String> {
+    compress(picture, quality, Subsamp::Sub2x2, true)
+}
+
+fn compress(
+    picture: &Picture,
+    quality: u8,
+    subsamp: Subsamp,
+    is_optimized: bool,
+) -> Result<Vec<u8>, String> {
+    let words = |error: turbojpeg::Error| message(&error);
+    let mut compressor = Compressor::new().map_err(words)?;
+    compressor
+        .set_quality(i32::from(quality.clamp(1, 100)))
+        .map_err(words)?;
+    compressor.set_subsamp(subsamp).map_err(words)?;
+    compressor.set_optimize(is_optimized).map_err(words)?;
+    let width = picture.width as usize;
+    let image = Image {
+        pixels: picture.rgba.as_slice(),
+        width,
+        pitch: width * 4,
+        height: picture.height as usize,
+        format: PixelFormat::RGBX,
+    };
+    let bytes = compressor.compress_to_owned(image).map_err(words)?;
+    Ok(bytes.to_vec())
 }
 
 /// Columns and rows from the frame header, reading no further.

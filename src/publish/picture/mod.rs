@@ -7,6 +7,7 @@
 mod difference;
 mod jpeg;
 mod raster;
+mod reduce;
 
 use std::fmt;
 use std::fs::File;
@@ -189,6 +190,15 @@ impl Picture {
     /// The encoder's words: a side of more than 65,500 pixels.
     pub fn to_jpeg(&self, quality: u8) -> Result<Vec<u8>, String> {
         jpeg::encode(self, quality)
+    }
+
+    /// The bytes of the smallest JPEG file of this quality (1 to 100, clamped): colour at half the
+    /// resolution, no metadata.
+    ///
+    /// # Errors
+    /// As [`Picture::to_jpeg`].
+    pub fn to_small_jpeg(&self, quality: u8) -> Result<Vec<u8>, String> {
+        jpeg::encode_small(self, quality)
     }
 
     /// The bytes of a PNG file, 8-bit RGB.

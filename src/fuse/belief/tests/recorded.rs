@@ -96,6 +96,7 @@ fn camera(value: &Value) -> Camera {
         height: size("height"),
         lens: Lens::Pinhole(Pinhole::new(intrinsics).unwrap()),
         mount: Mount::from_transform(RigidTransform::new(rotation, Vector::new(x, y, z))),
+        readout: None,
     }
 }
 
