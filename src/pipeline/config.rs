@@ -157,6 +157,12 @@ pub struct OutputConfig {
     pub annotate: bool,
     /// Whether every detection is written by itself too.
     pub detections: bool,
+    /// Whether the pictures are laid on the ground as a mosaic.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub mosaic: bool,
+    /// Side of the mosaic's pixels, metres; chosen from the data if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mosaic_m_per_px: Option<f64>,
 }
 
 /// What the command line lays over the pipeline file.
@@ -428,6 +434,8 @@ fn output(section: Section<'_>, path: &Path, overrides: &Overrides) -> Option<Ou
         formats: formats.clone().unwrap_or_default(),
         annotate: section.boolean("annotate").unwrap_or(true),
         detections: section.boolean("detections").unwrap_or(false),
+        mosaic: section.boolean("mosaic").unwrap_or(false),
+        mosaic_m_per_px: section.number("mosaic_m_per_px", f64::MIN_POSITIVE.., POSITIVE),
     };
     section.finish();
     formats.map(|_| config)
