@@ -14,6 +14,7 @@ use super::summary::Summary;
 use crate::error::{Error, Fault, Place};
 use crate::fuse::Fusion;
 use crate::input::Reject;
+use crate::publish::mosaic::encode;
 use crate::publish::report::{self, CropPlan, CutCrop};
 use crate::publish::{
     Folder, Format, Layer, Picture, Product, Rock, Scene, annotate, qgis, reject_table, stac, table,
@@ -109,11 +110,12 @@ impl<'a> Map<'a> {
         let pictures = self.pictures();
         observer.begin("publish", Some(pictures.len()));
         let mut files = Vec::new();
-        for product in self.products()? {
+        let (mosaic, warnings) = self.mosaic()?;
+        for product in self.products(mosaic)? {
             folder.write(&product)?;
             files.push(product.name);
         }
-        let warnings = Mutex::new(Vec::new());
+        let warnings = Mutex::new(warnings);
         let handled: Vec<Handled> = pictures
             .par_iter()
             .map(|&(view, picture)| {
@@ -134,10 +136,25 @@ impl<'a> Map<'a> {
         })
     }
 
-    fn products(&self) -> Result<Vec<Product>, Error> {
+    /// The pictures laid on the ground, where that is asked for, and what was odd about it.
+    fn mosaic(&self) -> Result<(Option<Product>, Vec<String>), Error> {
+        let output = &self.config.output;
+        if !output.mosaic {
+            return Ok((None, Vec::new()));
+        }
+        let (mosaic, mut warnings) = self.scene.mosaic(output.mosaic_m_per_px)?;
+        let Some(mosaic) = mosaic else {
+            warnings.push("no mosaic: no picture shows ground".to_owned());
+            return Ok((None, warnings));
+        };
+        let content = encode(mosaic, self.scene.site)?;
+        Ok((Some(Product::new("mosaic.tif", content)), warnings))
+    }
+
+    fn products(&self, mosaic: Option<Product>) -> Result<Vec<Product>, Error> {
         let layers = self.layers();
         let formats = &self.config.output.formats;
-        let mut products = Vec::new();
+        let mut products: Vec<Product> = mosaic.into_iter().collect();
         for format in formats {
             products.extend(format.write(&layers)?);
         }

@@ -42,6 +42,10 @@ impl Asset {
         let (media_type, role) = match (name, extension) {
             (_, "qml") => return None,
             (_, "qgz") => ("application/vnd.qgis.qgz", "visual"),
+            (_, "tif") => (
+                "image/tiff; application=geotiff; profile=cloud-optimized",
+                "visual",
+            ),
             ("run" | "timing", "json") => ("application/json", "metadata"),
             ("rejects" | "evidence", _) => ("text/csv", "metadata"),
             (_, extension) => {

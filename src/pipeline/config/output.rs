@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::super::formats::formats;
-use super::Overrides;
+use super::{Overrides, POSITIVE};
 use crate::input::Section;
 use crate::publish::Format;
 
@@ -25,6 +25,12 @@ pub struct OutputConfig {
     pub report: bool,
     /// Whether every detection is written by itself too.
     pub detections: bool,
+    /// Whether the pictures are laid on the ground as a mosaic.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub mosaic: bool,
+    /// Side of the mosaic's pixels, metres; chosen from the data if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mosaic_m_per_px: Option<f64>,
 }
 
 pub(super) fn output(
@@ -46,6 +52,8 @@ pub(super) fn output(
         annotate: section.boolean("annotate").unwrap_or(true),
         report: section.boolean("report").unwrap_or(true),
         detections: section.boolean("detections").unwrap_or(false),
+        mosaic: section.boolean("mosaic").unwrap_or(false),
+        mosaic_m_per_px: section.number("mosaic_m_per_px", f64::MIN_POSITIVE.., POSITIVE),
     };
     section.finish();
     formats.map(|_| config)

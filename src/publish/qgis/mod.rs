@@ -5,6 +5,7 @@ mod project;
 mod symbol;
 mod xml;
 
+pub(super) use project::local_crs;
 pub use project::{Project, qgz};
 
 use super::layer::{Kind, Layer};
