@@ -14,10 +14,10 @@
 //! | [`terrain`] | the ground: height at a place, first hit of a ray |
 //! | [`project`] | a detection on the ground, with its uncertainty |
 //! | [`matching`] | optimal assignment of two sides to each other |
-//! | [`fuse`] | detections of many views to one map of objects |
 //! | [`footprint`] | what a view could have seen |
 //! | [`adjust`] | places of objects and errors of poses that agree best with the measurements |
 //! | [`existence`] | which objects are real, and how often real ones are detected |
+//! | [`fuse`] | detections of many views to one map of objects |
 //! | [`publish`] | maps, tables, annotated pictures |
 //! | [`evaluate`] | a map against truth |
 //! | [`simulate`] | scenes with known truth: traverses, detectors, rendered pictures |
@@ -43,12 +43,12 @@ pub mod project;
 
 pub mod matching;
 
-pub mod fuse;
-
 pub mod footprint;
 
 pub mod adjust;
 pub mod existence;
+
+pub mod fuse;
 
 pub mod publish;
 

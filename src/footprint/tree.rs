@@ -7,7 +7,6 @@ use parry2d::partitioning::{Bvh, BvhBuildStrategy};
 use super::shape::point_bounds;
 use super::{Footprint, seen_by_at_least};
 use crate::frame::{Enu, Point};
-use crate::fuse::Coverage;
 
 /// The footprints of all views, by view index.
 pub struct Footprints {
@@ -93,11 +92,5 @@ impl Footprints {
             .collect();
         views.sort_unstable();
         views
-    }
-}
-
-impl Coverage for Footprints {
-    fn covers(&self, view: usize, place: Point<Enu>) -> bool {
-        self.footprints[view].covers(place.xyz.x, place.xyz.y)
     }
 }

@@ -43,6 +43,7 @@ pub use mixture::{MixtureSettings, Start, fuse_mixture};
 use nalgebra::Matrix3;
 use serde::Serialize;
 
+use crate::footprint::Footprints;
 use crate::frame::{Enu, Point};
 
 /// One detection on the ground, as fusion sees it.
@@ -67,6 +68,12 @@ pub trait Coverage: Sync {
 /// The coverage of views that see everything.
 #[derive(Debug, Clone, Copy)]
 pub struct Everywhere;
+
+impl Coverage for Footprints {
+    fn covers(&self, view: usize, place: Point<Enu>) -> bool {
+        self.of(view).covers(place.xyz.x, place.xyz.y)
+    }
+}
 
 impl Coverage for Everywhere {
     fn covers(&self, _view: usize, _place: Point<Enu>) -> bool {
