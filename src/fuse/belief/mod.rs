@@ -26,6 +26,7 @@
 //!     height: 960,
 //!     lens: Lens::Pinhole(Pinhole::new(intrinsics)?),
 //!     mount: Mount::default(),
+//!     readout: None,
 //! });
 //! let down = UnitQuaternion::from_euler_angles(0.0, 20f64.to_radians(), 0.0);
 //! let view = |i: u32| View {
