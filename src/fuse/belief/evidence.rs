@@ -41,8 +41,8 @@ impl Evidence {
 /// One in so many things that stand still and are detected is none of the objects: seldom seen, by
 /// an odd angle or light, and not what the detector was made for.
 const SELDOM: f64 = 0.01;
-/// How often such a thing is detected: a Beta distribution.
-const SELDOM_RATE: (f64, f64) = (1.0, 4.0);
+/// How often such a thing is detected: a Beta distribution, one look in ten in the mean.
+const SELDOM_RATE: (f64, f64) = (1.0, 9.0);
 
 /// How often an object was detected, and what that is worth if it is one.
 #[derive(Debug, Clone, Copy, Default)]
