@@ -12,36 +12,13 @@ pub(super) type ByPose = [[f64; 6]; 4];
 /// Six by six, row by row.
 pub(super) type Square6 = [[f64; 6]; 6];
 
-/// `h s h^T` of the first `n` rows.
+/// `h s h^T` of the first `n` rows: the spread that N uncertain unknowns give the rows.
 #[inline]
-pub(super) fn pose_spread(h: &ByPose, s: &Square6, n: usize) -> Square4 {
+pub(super) fn spread<const N: usize>(h: &[[f64; N]; 4], s: &[[f64; N]; N], n: usize) -> Square4 {
     let mut out = [[0.0; 4]; 4];
     for a in 0..n {
-        let mut left = [0.0; 6];
+        let mut left = [0.0; N];
         for (value, row) in h[a].iter().zip(s) {
-            for (l, x) in left.iter_mut().zip(row) {
-                *l += value * x;
-            }
-        }
-        for b in 0..=a {
-            let mut dot = 0.0;
-            for (l, x) in left.iter().zip(&h[b]) {
-                dot += l * x;
-            }
-            out[a][b] = dot;
-            out[b][a] = dot;
-        }
-    }
-    out
-}
-
-/// `h p h^T` of the first `n` rows.
-#[inline]
-pub(super) fn object_spread(h: &Square4, p: &Square4, n: usize) -> Square4 {
-    let mut out = [[0.0; 4]; 4];
-    for a in 0..n {
-        let mut left = [0.0; 4];
-        for (value, row) in h[a].iter().zip(p) {
             for (l, x) in left.iter_mut().zip(row) {
                 *l += value * x;
             }
@@ -151,11 +128,17 @@ impl Factor4 {
     }
 }
 
-/// `a += w h^T m h`, of the first `n` rows.
+/// `a += w h^T m h`, of the first `n` rows: the information that the rows give N unknowns.
 #[inline]
-pub(super) fn add_object_information(a: &mut Square4, h: &Square4, m: &Square4, n: usize, w: f64) {
+pub(super) fn add_information<const N: usize>(
+    a: &mut [[f64; N]; N],
+    h: &[[f64; N]; 4],
+    m: &Square4,
+    n: usize,
+    w: f64,
+) {
     for r in 0..n {
-        let mut left = [0.0; 4];
+        let mut left = [0.0; N];
         for s in 0..n {
             for (l, x) in left.iter_mut().zip(&h[s]) {
                 *l += m[r][s] * x;
@@ -251,16 +234,16 @@ mod tests {
     fn spreads_are_congruences() {
         let h: Square4 = std::array::from_fn(|i| std::array::from_fn(|j| (i * 4 + j) as f64 * 0.3));
         let expected = to_matrix4(&h) * to_matrix4(&S) * to_matrix4(&h).transpose();
-        assert!((to_matrix4(&object_spread(&h, &S, 4)) - expected).amax() < 1e-12);
+        assert!((to_matrix4(&spread(&h, &S, 4)) - expected).amax() < 1e-12);
         let mut a = [[0.0; 4]; 4];
-        add_object_information(&mut a, &h, &S, 4, 0.5);
+        add_information(&mut a, &h, &S, 4, 0.5);
         let expected = to_matrix4(&h).transpose() * to_matrix4(&S) * to_matrix4(&h) * 0.5;
         assert!((to_matrix4(&a) - expected).amax() < 1e-11);
         let by_pose: ByPose = std::array::from_fn(|i| std::array::from_fn(|j| (i + j) as f64));
         let covariance = Matrix6::from_fn(|i, j| if i == j { 2.0 } else { 0.1 });
         let rows = SMatrix::<f64, 4, 6>::from_fn(|i, j| by_pose[i][j]);
         let expected = rows * covariance * rows.transpose();
-        let found = pose_spread(&by_pose, &from_matrix(&covariance), 4);
+        let found = spread(&by_pose, &from_matrix(&covariance), 4);
         assert!((to_matrix4(&found) - expected).amax() < 1e-11);
         let (inverse, _) = inverse6(&from_matrix(&covariance)).unwrap();
         let identity = to_matrix6(&inverse) * covariance;

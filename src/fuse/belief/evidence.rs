@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::algebra::{Factor4, Square4, add_object_information, inverse4, pose_spread};
+use super::algebra::{self, Factor4, Square4, add_information, inverse4};
 use super::engine::Engine;
 use super::looks::Repeats;
 use super::noise::{ln_add, log_likelihood, with_noise};
@@ -125,7 +125,7 @@ impl Engine<'_> {
             };
             let (by_object, by_pose) = seen.of(look);
             let e = seen.residual(look);
-            let spread = pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
+            let spread = algebra::spread(&by_pose, &self.pose_cov[look.view], look.n);
             let variances = &self.looseness[edge.look];
             let rows = (look.n, look.n_rows());
             let factor = Factor4::new(&with_noise(&spread, variances, 1.0), look.n);
@@ -133,7 +133,7 @@ impl Engine<'_> {
             if let (Some(factor), Some((ln_likelihood, ..))) = (factor, likelihood) {
                 log_odds[k] += weight * (ln_likelihood - self.background[edge.look].clutter);
                 let m = factor.inverse();
-                add_object_information(&mut information[k], &by_object, &m, look.n, weight);
+                add_information(&mut information[k], &by_object, &m, look.n, weight);
             }
         }
         for (l, a) in log_odds.iter_mut().zip(&information) {

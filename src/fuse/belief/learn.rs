@@ -1,7 +1,7 @@
 //! What the data say of noise, clutter, density, sizes and detectability (3.5): one round of
 //! expectation maximisation.
 
-use super::algebra::{Square6, object_spread, pose_spread};
+use super::algebra::{self, Square6};
 use super::engine::{Engine, START_CLUTTER, START_TRANSIENTS, Scores};
 use super::evidence::{Evidence, probability};
 use super::looks::Repeats;
@@ -107,9 +107,9 @@ impl Engine<'_> {
             let variances = &self.looseness[edge.look];
             let weight = edge.weight * worth * robust_weight(&e, variances, look.n_rows());
             let (by_object, by_pose) = seen.of(look);
-            let mut spread = object_spread(&by_object, &self.object_cov[k], look.n);
+            let mut spread = algebra::spread(&by_object, &self.object_cov[k], look.n);
             if self.corrects_poses() {
-                let more = pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
+                let more = algebra::spread(&by_pose, &self.pose_cov[look.view], look.n);
                 for r in 0..look.n {
                     spread[r][r] += more[r][r];
                 }

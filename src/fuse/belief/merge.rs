@@ -196,7 +196,7 @@ impl Engine<'_> {
             return 0.0;
         };
         let (_, by_pose) = seen.of(look);
-        let spread = super::algebra::pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
+        let spread = super::algebra::spread(&by_pose, &self.pose_cov[look.view], look.n);
         let found = super::noise::log_likelihood(
             &seen.residual(look),
             &spread,

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::algebra::{ByPose, Square4, Square6, object_spread, pose_spread};
+use super::algebra::{self, ByPose, Square4, Square6};
 use super::data::Platform;
 use super::engine::{Engine, normal_cdf};
 use super::expect::Expected;
@@ -191,8 +191,8 @@ impl Engine<'_> {
             return None;
         }
         let (by_object, by_pose): (&Square4, &ByPose) = (&seen.by_object, &seen.by_pose);
-        let by_pose = pose_spread(by_pose, pose_cov, 4);
-        let mut spread = object_spread(by_object, cov, 4);
+        let by_pose = algebra::spread(by_pose, pose_cov, 4);
+        let mut spread = algebra::spread(by_object, cov, 4);
         for (row, more) in spread.iter_mut().zip(&by_pose) {
             for (s, m) in row.iter_mut().zip(more) {
                 *s += m;

@@ -1,11 +1,10 @@
 //! Registration of one view against the objects known so far (3.6).
 
-use super::algebra::{Factor4, Square4, Square6, inverse6, pose_spread};
+use super::algebra::{self, Factor4, Square4, Square6, add_information, inverse6};
 use super::data::Look;
 use super::engine::Engine;
 use super::noise::with_noise;
 use super::pairs::{Candidates, ViewExpectation, struck};
-use super::solve::add_pose_information;
 use crate::fuse::Exclusive;
 
 /// Candidates that are tried as the one right match.
@@ -96,7 +95,7 @@ impl Engine<'_> {
                     continue;
                 };
                 let (_, by_pose) = pair.seen.of(look);
-                add_pose_information(&mut a, &by_pose, &factor.inverse(), look.n, p);
+                add_information(&mut a, &by_pose, &factor.inverse(), look.n, p);
                 let weighted = factor.solve(&c.e);
                 for r in 0..look.n {
                     for (b, h) in b.iter_mut().zip(&by_pose[r]) {
@@ -277,7 +276,7 @@ impl<'a> Scoring<'a> {
                     }
                 }
             }
-            let mut spread = pose_spread(&m.by_pose, &base.cov, m.n);
+            let mut spread = algebra::spread(&m.by_pose, &base.cov, m.n);
             for (row, more) in spread.iter_mut().zip(&m.without_pose) {
                 for (s, x) in row.iter_mut().zip(more) {
                     *s += x;

@@ -218,7 +218,7 @@ impl Engine<'_> {
             let weight =
                 map.worth[look] * robust_weight(&e, &self.looseness[look], detection.n_rows());
             let mut a = [[0.0; 4]; 4];
-            super::algebra::add_object_information(&mut a, &h, &m, n, weight);
+            super::algebra::add_information(&mut a, &h, &m, n, weight);
             for i in 0..4 {
                 let mut b = 0.0;
                 for r in 0..n {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::algebra::{Factor4, Square4, add_object_information, inverse4, pose_spread};
+use super::algebra::{self, Factor4, Square4, add_information, inverse4};
 use super::curve::Detectability;
 use super::data::Look;
 use super::engine::{Engine, Normal, START_CLUTTER, START_TRANSIENTS, Scores};
@@ -190,14 +190,14 @@ impl Engine<'_> {
             };
             let e = seen.residual(look);
             let (by_object, by_pose) = seen.of(look);
-            let spread = pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
+            let spread = algebra::spread(&by_pose, &self.pose_cov[look.view], look.n);
             let noise = with_noise(&spread, &variances, 1.0);
             let Some(factor) = Factor4::new(&noise, look.n) else {
                 return best;
             };
             let prior = self.prior(&x);
             let mut a = prior.information;
-            add_object_information(&mut a, &by_object, &factor.inverse(), look.n, 1.0);
+            add_information(&mut a, &by_object, &factor.inverse(), look.n, 1.0);
             let weighted = factor.solve(&e);
             let b: [f64; 4] = std::array::from_fn(|i| {
                 prior.pull[i] + (0..4).map(|r| by_object[r][i] * weighted[r]).sum::<f64>()

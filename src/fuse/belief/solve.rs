@@ -4,8 +4,8 @@ use nalgebra::{SMatrix, Vector4, Vector6};
 use rayon::prelude::*;
 
 use super::algebra::{
-    ByPose, Factor4, Square4, Square6, add_object_information, from_matrix, inverse4, inverse6,
-    object_spread, pose_spread, to_matrix4,
+    self, ByPose, Factor4, Square4, Square6, add_information, from_matrix, inverse4, inverse6,
+    to_matrix4,
 };
 use super::engine::{Edge, Engine};
 use super::looks::Repeats;
@@ -187,7 +187,7 @@ impl Engine<'_> {
                 }
             }
         } else {
-            let spread = pose_spread(&by_pose, &self.pose_cov[look.view], look.n);
+            let spread = algebra::spread(&by_pose, &self.pose_cov[look.view], look.n);
             let factor = Factor4::new(&with_noise(&spread, variances, 1.0), look.n)?;
             information = factor.inverse();
             for (r, row) in information.iter_mut().enumerate() {
@@ -287,7 +287,7 @@ impl Engine<'_> {
             let x = &part.objects[edge.object];
             if let Some((h, m, n, _, _)) = self.information_of(edge.look, x) {
                 let weight = edge.weight * worth;
-                add_object_information(&mut information[edge.object], &h, &m, n, weight);
+                add_information(&mut information[edge.object], &h, &m, n, weight);
             }
         }
         information.iter().map(inverse_or_zero).collect()
@@ -303,7 +303,7 @@ impl Engine<'_> {
         let detection = &self.looks[look];
         let seen = self.expect(detection.view, x)?;
         let (by_object, by_pose) = seen.of(detection);
-        let spread = pose_spread(&by_pose, &self.pose_cov[detection.view], detection.n);
+        let spread = algebra::spread(&by_pose, &self.pose_cov[detection.view], detection.n);
         let noise = with_noise(&spread, &self.looseness[look], 1.0);
         let factor = Factor4::new(&noise, detection.n)?;
         let mut information = factor.inverse();
@@ -340,14 +340,14 @@ impl Engine<'_> {
                 continue;
             };
             let (by_object, by_pose) = seen.of(look);
-            let spread = object_spread(&by_object, &self.object_cov[edge.object], look.n);
+            let spread = algebra::spread(&by_object, &self.object_cov[edge.object], look.n);
             let variances = &self.looseness[edge.look];
             let Some(factor) = Factor4::new(&with_noise(&spread, variances, 1.0), look.n) else {
                 continue;
             };
             let trust = robust_weight(&seen.residual(look), variances, look.n_rows());
             let m = factor.inverse();
-            add_pose_information(
+            add_information(
                 &mut information[look.view],
                 &by_pose,
                 &m,
@@ -422,7 +422,7 @@ impl Normal {
         let k = row.object;
         self.nearest_m[k] = self.nearest_m[k].min(row.range_m);
         let a = &mut self.information[k];
-        add_object_information(a, &row.by_object, &row.information, row.n, 1.0);
+        add_information(a, &row.by_object, &row.information, row.n, 1.0);
         let toward = row.toward();
         for (p, h) in self.pull[k].iter_mut().zip(row.object_pull(&toward)) {
             *p += h;
@@ -477,24 +477,6 @@ impl Row {
             }
         }
         out
-    }
-}
-
-/// Adds `w h^T m h` to the information of a pose.
-pub(super) fn add_pose_information(a: &mut Square6, h: &ByPose, m: &Square4, n: usize, w: f64) {
-    for r in 0..n {
-        let mut left = [0.0; 6];
-        for s in 0..n {
-            for (l, x) in left.iter_mut().zip(&h[s]) {
-                *l += m[r][s] * x;
-            }
-        }
-        for (i, row) in a.iter_mut().enumerate() {
-            let scale = w * h[r][i];
-            for (x, l) in row.iter_mut().zip(&left) {
-                *x += scale * l;
-            }
-        }
     }
 }
 

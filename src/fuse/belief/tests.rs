@@ -159,9 +159,8 @@ fn noise_and_likelihoods() {
                 .expect(look.view, &engine.objects[edge.object])
                 .unwrap();
             let (by_object, by_pose) = seen.of(look);
-            let mut spread =
-                super::algebra::object_spread(&by_object, &engine.object_cov[edge.object], 4);
-            let more = super::algebra::pose_spread(&by_pose, &engine.pose_cov[look.view], 4);
+            let mut spread = super::algebra::spread(&by_object, &engine.object_cov[edge.object], 4);
+            let more = super::algebra::spread(&by_pose, &engine.pose_cov[look.view], 4);
             for (row, more) in spread.iter_mut().zip(&more) {
                 for (s, m) in row.iter_mut().zip(more) {
                     *s += m;
