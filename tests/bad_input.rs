@@ -309,6 +309,23 @@ fn an_unknown_key() {
 }
 
 #[test]
+fn confusion_that_does_not_add_up() {
+    let text = PIPELINE.to_owned()
+        + "\n[fusion.confusion]\nrock = { rock = 0.9, shadow = 0.2 }\nshadow = { rock = 1.5 }\n";
+    let line = PIPELINE.lines().count() + 3;
+    let sum = format!(
+        "error: pipeline.toml:{line}:1: fusion.confusion.rock: found probabilities that add up to \
+         1.100, expected 1, the sum over what the detector may say"
+    );
+    let range = format!(
+        "error: pipeline.toml:{}:12: fusion.confusion.shadow.rock: found 1.5, expected 0 to 1",
+        line + 1
+    );
+    let case = Case::new().with("pipeline.toml", &text);
+    refused(&case, &[], &[&sum, &range]);
+}
+
+#[test]
 fn norths_heights_and_bodies_that_do_not_serve() {
     let set = |assignments: &[&str], expected: &[&str]| {
         let arguments: Vec<&str> = assignments.iter().flat_map(|&a| ["--set", a]).collect();

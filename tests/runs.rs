@@ -110,6 +110,62 @@ fn real(set: &str) -> Option<PathBuf> {
     Some(folder)
 }
 
+/// Every third detection goes by another name: with the table the map is that of one class, and
+/// every rock is called what most of its detections say.
+#[test]
+fn classes_that_the_detector_takes_for_each_other() {
+    let tiny = root().join("fixtures/tiny");
+    let data = tempfile::tempdir().unwrap();
+    for entry in fs::read_dir(&tiny).unwrap().map(|e| e.unwrap().path()) {
+        if entry.is_file() {
+            fs::copy(&entry, data.path().join(entry.file_name().unwrap())).unwrap();
+        }
+    }
+    let listed = fs::read_to_string(tiny.join("detections.csv")).unwrap();
+    let renamed = listed.lines().enumerate().map(|(i, line)| match i % 3 {
+        2 => line.replacen(",rock,", ",shadow,", 1) + "\n",
+        _ => line.to_owned() + "\n",
+    });
+    let renamed: String = renamed.collect();
+    fs::write(data.path().join("detections.csv"), renamed).unwrap();
+    let run = |set: &[&str]| {
+        let set = [&["output.annotate=false"], set].concat();
+        Run::of("fixtures/tiny/pipeline.toml", Some(data.path()), &set)
+    };
+    let of_one_class = Run::of(
+        "fixtures/tiny/pipeline.toml",
+        None,
+        &["output.annotate=false"],
+    );
+    let table = "fusion.confusion={ rock = { rock = 0.65, shadow = 0.35 } }";
+    let confused = run(&[table]);
+    let sure = |run: &Run| {
+        let rocks = run.json("rocks.geojson")["features"]
+            .as_array()
+            .unwrap()
+            .clone();
+        let sure = rocks
+            .into_iter()
+            .filter(|r| r["properties"]["p_exist"].as_f64() > Some(0.9));
+        sure.collect::<Vec<Value>>()
+    };
+    let (one, two) = (sure(&of_one_class), sure(&confused));
+    assert_eq!(one.len(), two.len());
+    for (a, b) in one.iter().zip(&two) {
+        assert_eq!(b["properties"]["class"], "rock");
+        assert!(b["properties"]["p_class"].as_f64() > Some(0.5));
+        let [a, b] = [a, b].map(|r| r["geometry"]["coordinates"][1].as_f64().unwrap());
+        assert!((a - b).abs() * 111e3 < 0.02);
+    }
+    // Without it, two names are two things.
+    assert!(sure(&run(&[])).len() > one.len());
+    assert!(
+        of_one_class.json("rocks.geojson")["features"][0]["properties"]
+            .get("p_class")
+            .is_none()
+    );
+}
+
 #[test]
 fn the_same_bytes_at_any_number_of_threads_and_in_two_runs() {
     let with = |threads: usize| {

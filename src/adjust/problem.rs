@@ -62,7 +62,8 @@ pub struct Measurement {
     pub box_px: Option<Vector2<f64>>,
     /// Whether the picture's border cuts it.
     pub is_cut: bool,
-    /// What it is; only measurements of one class are of one object.
+    /// What the detector says it is; measurements of one object share it, unless the detector takes
+    /// classes for each other.
     pub class: usize,
     /// The detector's score, 0 to 1.
     pub score: Option<f64>,

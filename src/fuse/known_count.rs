@@ -202,6 +202,7 @@ fn object(views: &Views, members: &[(usize, f64)], all: &[Observation], class: u
         class,
         weight,
         size_m: None,
+        p_class: None,
         p_exist: None,
         members: listed,
     }

@@ -273,6 +273,7 @@ impl Mixture {
             class: self.class,
             weight: self.weights[k],
             size_m: None,
+            p_class: None,
             p_exist: None,
             members,
         }

@@ -90,6 +90,8 @@ pub struct Object {
     pub covariance: Matrix3<f64>,
     /// Its class.
     pub class: usize,
+    /// Probability that it is of that class, where the detector takes classes for each other.
+    pub p_class: Option<f64>,
     /// How many observations it accounts for: the sum of its memberships.
     pub weight: f64,
     /// Its size, metres, from methods that say.

@@ -262,11 +262,17 @@ impl<'a> Section<'a> {
 
     /// All sections below this one, with their names, in the order of the file.
     pub fn sections(&self) -> Vec<(String, Section<'a>)> {
+        let section = |key: String| {
+            let section = self.section(&key);
+            (key, section)
+        };
+        self.keys().into_iter().map(section).collect()
+    }
+
+    /// The keys that are there, in the order of the file.
+    pub fn keys(&self) -> Vec<String> {
         match self.node.map(|n| &n.kind) {
-            Some(Kind::Table(entries)) => entries
-                .iter()
-                .map(|(key, _)| (key.clone(), self.section(key)))
-                .collect(),
+            Some(Kind::Table(entries)) => entries.iter().map(|(key, _)| key.clone()).collect(),
             _ => Vec::new(),
         }
     }

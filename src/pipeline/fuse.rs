@@ -9,7 +9,7 @@ use super::stages::{self, Clock, Ground};
 use crate::adjust::{Measurement, Problem, Surface};
 use crate::error::Error;
 use crate::frame::{RigidTransform, Vector};
-use crate::fuse::belief::{Belief, BeliefSettings, Drift, fuse_belief};
+use crate::fuse::belief::{Belief, BeliefSettings, Confusion, Drift, fuse_belief};
 use crate::fuse::{Fusion, MixtureSettings, Object, Observation, Weights, fuse_mixture};
 use crate::input::Reject;
 use crate::pose::PoseSigma;
@@ -101,7 +101,11 @@ fn believed(
             max_range_m: config.view.max_range_m.unwrap_or(f64::INFINITY),
             min_range_m: config.view.min_range_m,
         };
-        let belief = fuse_belief(&problem, &settings(config));
+        let settings = BeliefSettings {
+            confusion: confusion(config, &measured.classes),
+            ..settings(config)
+        };
+        let belief = fuse_belief(&problem, &settings);
         let n = belief.objects.iter().filter(|o| o.p_exist >= 0.5).count();
         observer.end(&format!("{n} objects"));
         Ok(belief)
@@ -144,6 +148,39 @@ fn settings(config: &Config) -> BeliefSettings {
     }
 }
 
+/// P(said | true) over all classes of a run, where some are taken for others. Classes of which the
+/// run says nothing are taken for themselves.
+fn confusion(config: &Config, classes: &[Option<String>]) -> Option<Confusion> {
+    let table = &config.fusion.confusion;
+    if table.is_empty() {
+        return None;
+    }
+    let of = |class: &Option<String>| class.as_ref().and_then(|name| table.get(name));
+    let row = |class: &Option<String>| -> Vec<f64> {
+        let share = |said: &Option<String>| match (of(class), said) {
+            (Some(row), Some(said)) => row.get(said).copied().unwrap_or(0.0),
+            (Some(_), None) => 0.0,
+            (None, said) => f64::from(u8::from(said == class)),
+        };
+        classes.iter().map(share).collect()
+    };
+    Confusion::new(classes.iter().map(row).collect())
+}
+
+/// The classes of a run, sorted: those that detections say, and those that they may be of.
+fn classes(config: &Config, inputs: &Inputs) -> Vec<Option<String>> {
+    let said = inputs.detections.iter().map(|(_, d)| d.class.clone());
+    let table = &config.fusion.confusion;
+    let known = table.iter().flat_map(|(class, row)| {
+        let named = std::iter::once(class).chain(row.keys());
+        named.cloned().map(Some)
+    });
+    let mut classes: Vec<Option<String>> = said.chain(known).collect();
+    classes.sort_unstable();
+    classes.dedup();
+    classes
+}
+
 /// Detections as measurements.
 struct Measured {
     measurements: Vec<Measurement>,
@@ -155,13 +192,7 @@ struct Measured {
 
 fn measure(config: &Config, inputs: &Inputs) -> Measured {
     let settings = config.projection();
-    let mut classes: Vec<Option<String>> = inputs
-        .detections
-        .iter()
-        .map(|(_, d)| d.class.clone())
-        .collect();
-    classes.sort_unstable();
-    classes.dedup();
+    let classes = classes(config, inputs);
     let found: Vec<Result<Measurement, Miss>> = inputs
         .detections
         .par_iter()
@@ -283,6 +314,7 @@ fn fusion(config: &Config, belief: Belief, number: &[Option<usize>]) -> Fusion {
             place: o.place,
             covariance: o.covariance,
             class: o.class,
+            p_class: o.p_class,
             weight: o.weight,
             p_exist: Some(o.p_exist),
             size_m: o.size_m,

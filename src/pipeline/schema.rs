@@ -119,10 +119,12 @@ fn table(path: &str, keys: &[Asked], entries: &[Entry]) -> Value {
         }
         properties.insert(key.to_owned(), of_key);
     }
+    // The keys of a table of which none is known are names of the run's own.
+    let is_open = properties.is_empty();
     let mut all = json!({
         "type": "object",
         "properties": properties,
-        "additionalProperties": false,
+        "additionalProperties": is_open,
     });
     if !required.is_empty() {
         all["required"] = json!(required);

@@ -25,7 +25,7 @@ type OfMember<'a> = Column<'a, (&'a Rock, &'a Evidence, &'a Placed)>;
 impl Scene<'_> {
     /// Where the rocks are.
     pub(super) fn rocks(&self, rocks: &[Rock], run_id: &str) -> Layer {
-        let columns: Vec<OfRock<'_>> = vec![
+        let mut columns: Vec<OfRock<'_>> = vec![
             OfRock::text("rock_id", "name, within this run", |r| {
                 Some(r.rock_id.clone())
             }),
@@ -78,6 +78,10 @@ impl Scene<'_> {
             }),
             OfRock::text("run_id", "the run", |_| Some(run_id.to_owned())),
         ];
+        if rocks.iter().any(|r| r.object.p_class.is_some()) {
+            let about = "probability that it is of its class";
+            columns.insert(2, OfRock::real("p_class", 4, about, |r| r.object.p_class));
+        }
         let about = ("rocks", "Rocks", "where the rocks are");
         let rows = rocks.iter().map(|rock| {
             let point = Geometry::Point(lon_lat(rock.geodetic, self.site.planet()));

@@ -109,7 +109,7 @@ impl Engine<'_> {
                 });
                 self.objects.push(self.singles[look].object);
                 self.object_cov.push(self.singles[look].cov);
-                self.classes.push(self.looks[look].class);
+                self.classes.push(self.class_of(look));
             }
         }
         edges.sort_by_key(|e| (e.look, e.object));
@@ -117,6 +117,7 @@ impl Engine<'_> {
         let support = self.support();
         let keep: Vec<bool> = support.iter().map(|&s| s > LEAST_SUPPORT).collect();
         self.compact(&keep);
+        self.hear_classes();
     }
 
     /// Of every object the views that detected it, ascending.

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::algebra::{Square4, Square6};
+use super::classes::{Class, Kinds};
 use super::curve::Detectability;
 use super::data::{Look, Platform, PoseNow, looks, order, platforms};
 use super::expect::{Expected, expect};
@@ -136,6 +137,8 @@ pub(super) struct Engine<'a> {
     pub(super) untrusted: Vec<(usize, Singleton)>,
     pub(super) background: Vec<Background>,
     pub(super) has_sizes: bool,
+    /// Which classes are taken for which, where they are.
+    pub(super) kinds: Option<Arc<Kinds>>,
     pub(super) model: Model,
     /// Variances of the rows of every look.
     pub(super) looseness: Vec<[f64; 4]>,
@@ -148,10 +151,12 @@ pub(super) struct Engine<'a> {
     pub(super) view_area_m2: f64,
     // Objects.
     pub(super) objects: Vec<[f64; 4]>,
-    pub(super) classes: Vec<usize>,
+    pub(super) classes: Vec<Class>,
     /// Their covariances, the poses held.
     pub(super) object_cov: Vec<Square4>,
     pub(super) edges: Vec<Edge>,
+    /// How often each edge counts for the class of its object; empty without a table of confusion.
+    pub(super) class_times: Vec<f64>,
 }
 
 impl<'a> Engine<'a> {
@@ -164,6 +169,10 @@ impl<'a> Engine<'a> {
         let poses: Vec<PoseNow> = platforms.iter().map(|p| p.at(&[0.0; 6])).collect();
         let pose_cov: Vec<Square6> = platforms.iter().map(|p| p.prior(&[1.0; 6])).collect();
         let has_sizes = looks.iter().any(|l| l.log_px.is_some());
+        let kinds = settings.confusion.as_ref().map(|confusion| {
+            let said = looks.iter().map(|l| l.class);
+            Arc::new(Kinds::new(confusion, said))
+        });
         let model = Model {
             scales: [1.0; 4],
             pose_scale: [1.0; 6],
@@ -201,6 +210,7 @@ impl<'a> Engine<'a> {
             untrusted: Vec::new(),
             background: Vec::new(),
             has_sizes,
+            kinds,
             model,
             looseness: Vec::new(),
             typical: [1.0; 2],
@@ -211,6 +221,7 @@ impl<'a> Engine<'a> {
             classes: Vec::new(),
             object_cov: Vec::new(),
             edges: Vec::new(),
+            class_times: Vec::new(),
         };
         let places = engine.poses.iter().map(|p| (p.origin.x, p.origin.y));
         engine.smooth = SmoothGround::new(problem.surface, places).map(Arc::new);

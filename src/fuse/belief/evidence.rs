@@ -109,6 +109,9 @@ impl Engine<'_> {
             *l += prior.ln_density + 2.0 * (2.0 * PI).ln();
             information.push(prior.information);
         }
+        for (k, l) in log_odds.iter_mut().enumerate() {
+            *l += self.class_evidence(k);
+        }
         for (edge, worth) in self.edges.iter().zip(&edge_worth) {
             let (look, k) = (&self.looks[edge.look], edge.object);
             let pair = find(pairs, look.view, k);

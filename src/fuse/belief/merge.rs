@@ -57,6 +57,7 @@ impl Engine<'_> {
             .collect();
         let keep: Vec<bool> = into.iter().enumerate().map(|(k, &to)| k == to).collect();
         self.compact(&keep);
+        self.hear_classes();
         self.adjust(2, Robust::Contaminated, false);
     }
 
@@ -87,9 +88,12 @@ impl Engine<'_> {
         let mut twins = Vec::new();
         for (a, x) in self.objects.iter().enumerate() {
             for b in near.about(x[0], x[1], reach_m) {
-                if b <= a || self.classes[a] != self.classes[b] {
+                if b <= a {
                     continue;
                 }
+                let Some(ln_class) = self.one_class(a, b) else {
+                    continue;
+                };
                 let y = &self.objects[b];
                 let d = [x[0] - y[0], x[1] - y[1]];
                 if d[0] * d[0] + d[1] * d[1] > reach_m * reach_m {
@@ -104,7 +108,8 @@ impl Engine<'_> {
                     continue;
                 }
                 let mut ln_odds =
-                    -0.5 * m2 - (2.0 * PI).ln() - 0.5 * det.ln() - self.model.density.ln();
+                    -0.5 * m2 - (2.0 * PI).ln() - 0.5 * det.ln() - self.model.density.ln()
+                        + ln_class;
                 if self.has_sizes {
                     let v = c(3, 3);
                     ln_odds += -0.5 * (x[3] - y[3]).powi(2) / v - 0.5 * v.ln()

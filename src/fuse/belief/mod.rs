@@ -115,6 +115,7 @@
 //! | `ground`, `footprint` | heights looked up; ground and room that views see | 0, 3.1 |
 //! | `single` | what one detection says by itself; where everything starts | 0 |
 //! | `curve` | how often objects are detected, by apparent size or range | 3.1 |
+//! | `classes` | of which class an object is, where the detector takes classes for each other | |
 //! | `near` | objects near a place | |
 //! | `pairs` | which objects a view expects, and which detections may be of them | 3.1 |
 //! | `looks` | how many independent looks a row of looks is worth | 3.x |
@@ -133,6 +134,7 @@
 
 mod algebra;
 mod associate;
+mod classes;
 mod curve;
 mod data;
 mod drift;
@@ -155,6 +157,7 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
+pub use classes::Confusion;
 pub use drift::Drift;
 pub use outcome::{Belief, BeliefEvidence, BeliefObject, Single, fuse_belief};
 
@@ -199,6 +202,8 @@ pub struct BeliefSettings {
     pub radius_m: f64,
     /// Mean and standard deviation of the objects' sizes, metres, where they are known beforehand.
     pub size_m: Option<(f64, f64)>,
+    /// Which classes the detector takes for which; it never does without.
+    pub confusion: Option<Confusion>,
     /// Opening angle of views without a camera, radians.
     pub fov: f64,
     /// Errors of readings of one object fade in this time, seconds.
@@ -223,6 +228,7 @@ impl Default for BeliefSettings {
             shape: 0.0,
             radius_m: 0.0,
             size_m: None,
+            confusion: None,
             fov: std::f64::consts::TAU,
             geometry_time_s: 1.5,
             event_time_s: 0.5,

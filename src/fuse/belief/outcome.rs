@@ -51,6 +51,8 @@ pub struct BeliefObject {
     pub size_m: Option<f64>,
     /// Its class.
     pub class: usize,
+    /// The probability that it is of that class, where the detector takes classes for each other.
+    pub p_class: Option<f64>,
     /// Probability that it is real.
     pub p_exist: f64,
     /// The sum of its memberships.
@@ -283,13 +285,15 @@ impl Engine<'_> {
         let objects = (0..self.objects.len())
             .map(|k| {
                 let x = &self.objects[k];
+                let (class, p_class) = self.best_class(k);
                 let mut members = std::mem::take(&mut members[k]);
                 members.sort_by_key(|m| m.observation);
                 BeliefObject {
                     place: Point::new(x[0], x[1], x[2]),
                     covariance: place_cov(&cov[k]),
                     size_m: self.has_sizes.then(|| x[3].exp()),
-                    class: self.classes[k],
+                    class,
+                    p_class,
                     p_exist: probability(log_odds[k]),
                     weight: support[k],
                     members,

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::algebra::{self, ByPose, Square4, Square6};
+use super::classes::{Class, Given};
 use super::data::Platform;
 use super::engine::{Engine, normal_cdf};
 use super::expect::Expected;
@@ -61,6 +62,8 @@ pub(super) struct CandidateInFull {
     pub(super) candidate: Candidate,
     pub(super) e: [f64; 4],
     pub(super) variances: [f64; 4],
+    /// What of the likelihood comes of the class.
+    pub(super) ln_class: f64,
 }
 
 /// What all views expect.
@@ -84,7 +87,9 @@ pub(super) struct ViewExpectation {
 pub(super) struct Candidates<'a> {
     pub(super) objects: &'a [[f64; 4]],
     pub(super) cov: &'a [Square4],
-    pub(super) classes: &'a [usize],
+    pub(super) classes: &'a [Class],
+    /// Which detections made them what they are, the view's own among them.
+    pub(super) given: Given<'a>,
     /// Probabilities that they exist; all do where there are none.
     pub(super) exist: &'a [f64],
     pub(super) near: &'a Buckets,
@@ -103,6 +108,10 @@ impl Engine<'_> {
             objects: &self.objects,
             cov: &self.object_cov,
             classes: &self.classes,
+            given: Given {
+                edges: &self.edges,
+                times: &self.class_times,
+            },
             exist: &[],
             near: &near,
         };
@@ -153,11 +162,15 @@ impl Engine<'_> {
             }
         }
         for p in 0..found.pairs.len() {
+            let pair = &found.pairs[p];
+            let object = pair.pair.object;
+            let joins = self.joins(view, object, &among.classes[object], among.given);
             for look in self.looks_of(view) {
-                let pair = &found.pairs[p];
-                if self.looks[look].class == among.classes[pair.pair.object]
-                    && let Some(candidate) = self.candidate(look, p, pair)
+                if let Some(ln_class) = joins(self.looks[look].class)
+                    && let Some(mut candidate) = self.candidate(look, p, pair)
                 {
+                    candidate.candidate.ln_likelihood += ln_class;
+                    candidate.ln_class = ln_class;
                     found.candidates.push(candidate);
                 }
             }
@@ -277,6 +290,7 @@ impl Engine<'_> {
             },
             e,
             variances: loose,
+            ln_class: 0.0,
         })
     }
 }

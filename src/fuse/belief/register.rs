@@ -185,7 +185,7 @@ impl Engine<'_> {
                     e: c.e,
                     by_pose,
                     without_pose: spread_without_pose(pair, c, look),
-                    base: (pair.exists * pair.pair.p_detect).ln()
+                    base: (pair.exists * pair.pair.p_detect).ln() + c.ln_class
                         - self.background[c.candidate.look].all
                         - unit * look.n_rows(),
                     ambiguity: count[local],

@@ -1,6 +1,7 @@
 //! Stage A: the views are taken in one after the other (3.6).
 
 use super::algebra::Square4;
+use super::classes::{Class, Given};
 use super::engine::{Edge, Engine};
 use super::evidence::probability;
 use super::looks::Repeats;
@@ -30,7 +31,7 @@ const LEAST_MEMBERSHIP: f64 = 0.05;
 struct Growing {
     objects: Vec<[f64; 4]>,
     cov: Vec<Square4>,
-    classes: Vec<usize>,
+    classes: Vec<Class>,
     /// Log-odds that they exist, and the probabilities as registration takes them.
     log_odds: Vec<f64>,
     exist: Vec<f64>,
@@ -104,6 +105,7 @@ impl Engine<'_> {
         self.objects = map.objects;
         self.object_cov = map.cov;
         self.classes = map.classes;
+        self.hear_classes();
     }
 
     /// Registers a view, and gives its detections to the objects they are of.
@@ -118,6 +120,7 @@ impl Engine<'_> {
             objects: &map.objects,
             cov: &map.cov,
             classes: &map.classes,
+            given: Given::NONE,
             exist: &map.exist,
             near: &map.near,
         };
@@ -162,7 +165,10 @@ impl Engine<'_> {
                 taken.push(object);
                 map.own[c.look] = Some(object);
                 let clutter = self.background[c.look].clutter;
-                map.log_odds[object] += map.news(self, object, view)
+                let news = map.news(self, object, view);
+                let said = self.looks[c.look].class;
+                map.classes[object].hear(self.kinds.as_deref(), said, news);
+                map.log_odds[object] += news
                     * (c.ln_likelihood - clutter
                         + found.pairs[c.pair].pair.p_detect.max(0.02).ln());
             }
@@ -191,7 +197,7 @@ impl Engine<'_> {
             map.near.put(k, single.object[0], single.object[1]);
             map.objects.push(single.object);
             map.cov.push(single.cov);
-            map.classes.push(self.looks[look].class);
+            map.classes.push(self.class_of(look));
             let background = &self.background[look];
             map.log_odds.push(background.new - background.clutter);
             // Where nothing is registered, nothing is lost by trusting every object.

@@ -11,6 +11,7 @@
 //! independent, messages stop at a relative change, derivatives are taken by the rotation vector at
 //! the error itself.
 
+mod confusion;
 mod recorded;
 mod solution;
 

@@ -1,5 +1,7 @@
 //! `[fusion]`: the method.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::{POSITIVE, not_negative, positive};
@@ -33,6 +35,9 @@ pub struct FusionConfig {
     pub radius_m: f64,
     /// `belief`: mean and standard deviation of the objects' sizes, metres.
     pub size_m: Option<(f64, f64)>,
+    /// `belief`: which classes the detector takes for which: for each true class the classes it says,
+    /// with their probabilities.
+    pub confusion: BTreeMap<String, BTreeMap<String, f64>>,
     /// `belief`: errors of looks at one object fade in this time, seconds.
     pub geometry_time_s: f64,
     /// `belief`: whether an object is detected depends on the last look for this time, seconds.
@@ -98,6 +103,7 @@ pub(super) fn fusion(section: Section<'_>) -> Option<FusionConfig> {
         shape: not_negative(&section, "shape", 0.0),
         radius_m: not_negative(&section, "radius_m", 0.0),
         size_m: size_m(&section),
+        confusion: confusion(&section),
         geometry_time_s: positive(&section, "geometry_time_s", 1.5),
         event_time_s: positive(&section, "event_time_s", 0.5),
     });
@@ -115,4 +121,32 @@ fn size_m(section: &Section<'_>) -> Option<(f64, f64)> {
         section.fault("size_sigma_m", sigma, expected);
     }
     mean.map(|mean| (mean, sigma.unwrap_or(0.1 * mean)))
+}
+
+/// Probabilities add up to one this closely.
+const SUM: f64 = 1e-3;
+
+/// Which classes the detector takes for which; a class without a line is never taken for another.
+fn confusion(section: &Section<'_>) -> BTreeMap<String, BTreeMap<String, f64>> {
+    let table = section.section("confusion");
+    let mut all = BTreeMap::new();
+    for (class, row) in table.sections() {
+        let said = row.keys();
+        let probabilities: BTreeMap<String, f64> = said
+            .into_iter()
+            .filter_map(|said| {
+                let p = row.number(&said, 0.0..=1.0, "0 to 1")?;
+                Some((said, p))
+            })
+            .collect();
+        let sum: f64 = probabilities.values().sum();
+        if probabilities.len() == row.keys().len() && (sum - 1.0).abs() > SUM {
+            let found = format!("probabilities that add up to {sum:.3}");
+            table.fault(&class, found, "1, the sum over what the detector may say");
+        }
+        row.finish();
+        all.insert(class, probabilities);
+    }
+    table.finish();
+    all
 }

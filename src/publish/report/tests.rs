@@ -122,6 +122,7 @@ impl Field {
                 class: 0,
                 weight: f64::from(looks),
                 size_m: None,
+                p_class: None,
                 p_exist: (i % 2 == 0).then_some(0.75),
                 members,
             });

@@ -240,7 +240,8 @@ impl Recorded {
             // Without sizes nothing but the prior speaks of an object's size.
             let of_size = engine.model.size.variance;
             engine.object_cov.push(square4(&object["cov"], of_size));
-            engine.classes.push(0);
+            let class = engine.class_of(0);
+            engine.classes.push(class);
         }
         for edge in list(&self.root["edges"]) {
             engine.edges.push(Edge {

@@ -20,6 +20,7 @@ fn among<'a>(engine: &'a Engine<'_>, near: &'a Buckets, exist: &'a [f64]) -> Can
         objects: &engine.objects,
         cov: &engine.object_cov,
         classes: &engine.classes,
+        given: crate::fuse::belief::classes::Given::NONE,
         exist,
         near,
     }
