@@ -22,6 +22,7 @@ from qgis.core import (  # noqa: E402
     QgsMapRendererParallelJob,
     QgsMapSettings,
     QgsProject,
+    QgsRasterLayer,
     QgsVectorLayer,
     QgsWkbTypes,
 )
@@ -124,12 +125,31 @@ def draw(project, extent, picture, pixels=(1600, 1100)):
     print(f"drawn to {picture}")
 
 
+def check_mosaic(folder, project, mosaic):
+    """The lowest layer, in its own colours, with its opacity for what no picture shows."""
+    expect("mosaic: is a raster", isinstance(mosaic, QgsRasterLayer) and mosaic.isValid(), True)
+    expect("mosaic: moved along", str(folder) in mosaic.source(), True)
+    expect("mosaic: crs", mosaic.crs() == project.crs(), True)
+    expect("mosaic: is lowest", project.layerTreeRoot().layerOrder()[-1].id(), mosaic.id())
+    renderer = mosaic.renderer()
+    expect("mosaic: renderer", renderer.type(), "multibandcolor")
+    bands = (renderer.redBand(), renderer.greenBand(), renderer.blueBand(), renderer.alphaBand())
+    expect("mosaic: bands", bands, (1, 2, 3, 4))
+    stretched = [e for e in (renderer.redContrastEnhancement(), renderer.blueContrastEnhancement()) if e]
+    expect("mosaic: colours are as the pictures have them", stretched, [])
+    print(f"{'mosaic.tif':32} {mosaic.width()} x {mosaic.height()}  {renderer.type()}")
+
+
 def check_project(folder, counts, picture):
     project = QgsProject.instance()
     expect("rockmap.qgz: opens", project.read(str(folder / "rockmap.qgz")), True)
     expect("rockmap.qgz: crs is valid", project.crs().isValid(), True)
     expect("rockmap.qgz: metres", project.crs().isGeographic(), False)
     layers = {layer.id().replace("rockmap_", ""): layer for layer in project.mapLayers().values()}
+    mosaic = layers.pop("mosaic", None)
+    expect("rockmap.qgz: shows the mosaic", mosaic is not None, (folder / "mosaic.tif").exists())
+    if mosaic is not None:
+        check_mosaic(folder, project, mosaic)
     expect("rockmap.qgz: layers", sorted(layers), sorted(counts))
     for name, layer in layers.items():
         expect(f"rockmap.qgz: {name} is valid", layer.isValid(), True)
