@@ -100,6 +100,28 @@ def check_files(folder, body, counts):
         print(f"{'rockmap.gpkg ' + name:32} {layer.featureCount():6}  {layer.renderer().type()}")
 
 
+def check_tables(folder, counts):
+    """Tables with places open as layers, too, by the columns the documentation names."""
+    for name, count in counts.items():
+        path = folder / f"{name}.csv"
+        if not path.exists() or count == 0:
+            continue
+        is_point = GEOMETRY[name] == QgsWkbTypes.PointGeometry
+        columns = "xField=lon_deg&yField=lat_deg" if is_point else "wktField=wkt"
+        source = f"{path.as_uri()}?type=csv&{columns}&crs=EPSG:4326&detectTypes=yes"
+        layer = QgsVectorLayer(source, name, "delimitedtext")
+        expect(f"{path.name}: is valid", layer.isValid(), True)
+        placed = [f for f in layer.getFeatures() if f.hasGeometry()]
+        features = json.loads((folder / f"{name}.geojson").read_text())["features"]
+        expect(f"{path.name}: places", len(placed), sum(f["geometry"] is not None for f in features))
+        expect(f"{path.name}: geometry", layer.geometryType(), GEOMETRY[name])
+        numbers = [f.name() for f in layer.fields() if f.isNumeric()]
+        measures = [f.name() for f in layer.fields() if f.name().endswith(("_m", "_m2"))]
+        filled = [m for m in measures if any(f[m] not in (None, "") and str(f[m]) != "NULL" for f in placed)]
+        expect(f"{path.name}: measures are numbers", sorted(set(filled) - set(numbers)), [])
+        print(f"{path.name:32} {len(placed):6}  by {columns}")
+
+
 def draw(project, extent, picture, pixels=(1600, 1100)):
     settings = QgsMapSettings()
     settings.setLayers(project.layerTreeRoot().checkedLayers())
@@ -184,6 +206,7 @@ def main(outputs, picture):
                 for path in sorted(folder.glob("*.geojson"))
             }
             check_files(folder, body, counts)
+            check_tables(folder, counts)
             check_project(folder, counts, picture)
             QgsProject.instance().clear()
     except Fault as fault:

@@ -94,9 +94,10 @@ fn apparent_width_px(view: &View, place: Point<Enu>, drawn: Pixel, width_m: f64)
 /// A box with a side that the border of a picture (columns, rows) cuts moved outwards: so far that
 /// its height is its width times `aspect`, or where both are cut that it is `width_px` wide.
 fn whole(b: PixelBox, (columns, rows): (u32, u32), width_px: f64, aspect: f64) -> PixelBox {
+    // A box that reaches farther is as large as its detector thinks the object, not cut.
     let is_cut = |low: f64, high: f64, end: u32| {
-        let end = f64::from(end) - 0.5;
-        (low < BORDER_PX - 0.5, high > end - BORDER_PX)
+        let lies_on = |at: f64, border: f64| (at - border).abs() < BORDER_PX;
+        (lies_on(low, -0.5), lies_on(high, f64::from(end) - 0.5))
     };
     let (across, down) = (
         is_cut(b.x_min, b.x_max, columns),
@@ -150,6 +151,8 @@ mod tests {
         // By what the rock looks like.
         let corner = whole(square(620.0, 470.0, 639.5, 479.5));
         assert_eq!(corner, square(620.0, 470.0, 680.0, 500.0));
+        let beyond = square(-12.0, 100.0, 19.5, 130.0);
+        assert_eq!(whole(beyond), beyond);
         // Larger than that: it stays. Cut on both sides: nobody knows where to grow.
         let large = square(-0.5, 100.0, 99.5, 130.0);
         assert_eq!(whole(large), large);
