@@ -162,6 +162,36 @@ def check_accessible(page):
     expect("controls that Tab does not reach", missing, set())
 
 
+def check_charts(page):
+    """Both axes of every chart are named, and no number on them is missing."""
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll("figure.chart")]
+            .filter((figure) => [...figure.querySelectorAll("svg text.name")].filter((name) => name.textContent.trim()).length !== 2
+                || /NaN|undefined|Infinity/.test(figure.textContent))
+            .map((figure) => figure.querySelector("figcaption").textContent)"""
+    )
+    expect("charts without a name on both axes", nameless, [])
+    if page.evaluate("() => typeof VIEWS !== 'undefined' && !VIEWS.correction.every(Number.isNaN)"):
+        titles = page.locator("#poses figcaption").all_inner_texts()
+        for title in ["Corrections of position", "Corrections of attitude"]:
+            expect(f"pose corrections: {title}", title in titles)
+
+
+def check_changes(page, with_map):
+    """The section on what changed says how many are the same, and leads to the rocks that are new."""
+    counts = page.evaluate("() => JSON.parse(document.getElementById('data').textContent).changes.summary.counts")
+    said = page.inner_text("#changes .tiles")
+    for status, count in counts.items():
+        expect(f"changes: says {status}", f"{count:,}\n {status}" in said or f"{count:,} {status}" in said.replace("\n", " "))
+    expect("changes: a map", page.locator("#changes figure.broad path.spots").count() > 0)
+    if with_map and counts["new"]:
+        page.evaluate("() => { for (const list of document.querySelectorAll('#changes details')) list.open = true; }")
+        link = page.locator("#changes button.link").last
+        name = link.inner_text()
+        link.click()
+        expect("changes: a click chooses the rock", page.inner_text("#rock h2"), name)
+
+
 def frames(page):
     """Script and whole frames while panning, milliseconds: (median script, median, 95th, longest)."""
     return page.evaluate(
@@ -249,7 +279,11 @@ def main():
         pictures.mkdir(parents=True, exist_ok=True)
         for scheme in ["light", "dark"]:
             page, faults = opened(browser, report, scheme)
-            rocks = page.evaluate("() => N_ROCKS")
+            check_charts(page)
+            with_map = page.evaluate("() => typeof N_ROCKS !== 'undefined'")
+            if page.locator("#changes").is_visible():
+                check_changes(page, with_map)
+            rocks = page.evaluate("() => N_ROCKS") if with_map else 0
             if rocks:
                 with_crops = page.evaluate("() => DATA.crops.length") > 0
                 name = page.evaluate("() => ROCKS.id[DATA.crops[0]?.rock ?? map.nearest()]")
@@ -264,6 +298,8 @@ def main():
             page.screenshot(path=pictures / "report-of-many.png")
             expect(f"{many}", faults, [])
         browser.close()
+        if not with_map:
+            return
         # Without the 60 frames a second of a screen, a frame takes what script and paint take.
         unpaced = ["--no-sandbox", "--disable-frame-rate-limit", "--disable-gpu-vsync"]
         browser = playwright.chromium.launch(executable_path=chromium, args=unpaced)

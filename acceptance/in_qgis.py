@@ -22,6 +22,7 @@ from qgis.core import (  # noqa: E402
     QgsMapRendererParallelJob,
     QgsMapSettings,
     QgsProject,
+    QgsRasterLayer,
     QgsVectorLayer,
     QgsWkbTypes,
 )
@@ -99,6 +100,28 @@ def check_files(folder, body, counts):
         print(f"{'rockmap.gpkg ' + name:32} {layer.featureCount():6}  {layer.renderer().type()}")
 
 
+def check_tables(folder, counts):
+    """Tables with places open as layers, too, by the columns the documentation names."""
+    for name, count in counts.items():
+        path = folder / f"{name}.csv"
+        if not path.exists() or count == 0:
+            continue
+        is_point = GEOMETRY[name] == QgsWkbTypes.PointGeometry
+        columns = "xField=lon_deg&yField=lat_deg" if is_point else "wktField=wkt"
+        source = f"{path.as_uri()}?type=csv&{columns}&crs=EPSG:4326&detectTypes=yes"
+        layer = QgsVectorLayer(source, name, "delimitedtext")
+        expect(f"{path.name}: is valid", layer.isValid(), True)
+        placed = [f for f in layer.getFeatures() if f.hasGeometry()]
+        features = json.loads((folder / f"{name}.geojson").read_text())["features"]
+        expect(f"{path.name}: places", len(placed), sum(f["geometry"] is not None for f in features))
+        expect(f"{path.name}: geometry", layer.geometryType(), GEOMETRY[name])
+        numbers = [f.name() for f in layer.fields() if f.isNumeric()]
+        measures = [f.name() for f in layer.fields() if f.name().endswith(("_m", "_m2"))]
+        filled = [m for m in measures if any(f[m] not in (None, "") and str(f[m]) != "NULL" for f in placed)]
+        expect(f"{path.name}: measures are numbers", sorted(set(filled) - set(numbers)), [])
+        print(f"{path.name:32} {len(placed):6}  by {columns}")
+
+
 def draw(project, extent, picture, pixels=(1600, 1100)):
     settings = QgsMapSettings()
     settings.setLayers(project.layerTreeRoot().checkedLayers())
@@ -124,12 +147,31 @@ def draw(project, extent, picture, pixels=(1600, 1100)):
     print(f"drawn to {picture}")
 
 
+def check_mosaic(folder, project, mosaic):
+    """The lowest layer, in its own colours, with its opacity for what no picture shows."""
+    expect("mosaic: is a raster", isinstance(mosaic, QgsRasterLayer) and mosaic.isValid(), True)
+    expect("mosaic: moved along", str(folder) in mosaic.source(), True)
+    expect("mosaic: crs", mosaic.crs() == project.crs(), True)
+    expect("mosaic: is lowest", project.layerTreeRoot().layerOrder()[-1].id(), mosaic.id())
+    renderer = mosaic.renderer()
+    expect("mosaic: renderer", renderer.type(), "multibandcolor")
+    bands = (renderer.redBand(), renderer.greenBand(), renderer.blueBand(), renderer.alphaBand())
+    expect("mosaic: bands", bands, (1, 2, 3, 4))
+    stretched = [e for e in (renderer.redContrastEnhancement(), renderer.blueContrastEnhancement()) if e]
+    expect("mosaic: colours are as the pictures have them", stretched, [])
+    print(f"{'mosaic.tif':32} {mosaic.width()} x {mosaic.height()}  {renderer.type()}")
+
+
 def check_project(folder, counts, picture):
     project = QgsProject.instance()
     expect("rockmap.qgz: opens", project.read(str(folder / "rockmap.qgz")), True)
     expect("rockmap.qgz: crs is valid", project.crs().isValid(), True)
     expect("rockmap.qgz: metres", project.crs().isGeographic(), False)
     layers = {layer.id().replace("rockmap_", ""): layer for layer in project.mapLayers().values()}
+    mosaic = layers.pop("mosaic", None)
+    expect("rockmap.qgz: shows the mosaic", mosaic is not None, (folder / "mosaic.tif").exists())
+    if mosaic is not None:
+        check_mosaic(folder, project, mosaic)
     expect("rockmap.qgz: layers", sorted(layers), sorted(counts))
     for name, layer in layers.items():
         expect(f"rockmap.qgz: {name} is valid", layer.isValid(), True)
@@ -164,6 +206,7 @@ def main(outputs, picture):
                 for path in sorted(folder.glob("*.geojson"))
             }
             check_files(folder, body, counts)
+            check_tables(folder, counts)
             check_project(folder, counts, picture)
             QgsProject.instance().clear()
     except Fault as fault:

@@ -150,3 +150,63 @@ fn two_nights_with_known_changes() {
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(table.starts_with("same              "), "{table}");
 }
+
+#[test]
+fn geopackages_compare_as_geojson_does() {
+    let home = tempfile::tempdir().unwrap();
+    let home = home.path();
+    let run = |name: &str, set: &[&str]| {
+        let overrides = Overrides {
+            out: Some(home.join(name)),
+            set: set.iter().map(|&s| s.to_owned()).collect(),
+            ..Overrides::default()
+        };
+        let config = Config::read(&root().join("fixtures/tiny/pipeline.toml"), &overrides).unwrap();
+        pipeline::run(&config, false, &Silent).unwrap();
+        home.join(name)
+    };
+    let both = run("both", &["output.report=false"]);
+    let paper = "fusion.method=\"paper\"";
+    let package = run("package", &["output.formats=[\"gpkg\"]", paper]);
+    let text = run(
+        "text",
+        &["output.formats=[\"geojson\"]", paper, "output.report=false"],
+    );
+    let compared = |a: &Path, b: &Path, name: &str| -> (Value, String) {
+        let out = home.join(name);
+        let [a, b, at] = [a, b, &out].map(|path| path.to_str().unwrap());
+        let output = compare(&[a, b, "--out", at, "--json"]);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{stderr}");
+        let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let report = fs::read_to_string(out.join("report.html")).unwrap();
+        (summary, report)
+    };
+    let (of_text, page) = compared(&both, &text, "1");
+    let (of_package, report) = compared(&both, &package, "2");
+    let (of_file, _) = compared(&both, &package.join("rockmap.gpkg"), "3");
+    for other in [&of_package, &of_file] {
+        for part in ["counts", "agreement", "shift"] {
+            assert_eq!(other[part], of_text[part], "{part}");
+        }
+        assert_eq!(other["b"]["footprints"], true);
+    }
+    assert!(of_text["counts"]["same"].as_u64() > Some(5), "{of_text}");
+
+    // With the later run's report, its page with a section more; without, a page of that alone.
+    assert!(report.contains("<h1>tiny</h1>") && report.contains("id=\"map\""));
+    assert!(report.contains("\"changes\":{") && !report.contains("\"annotated/"));
+    assert!(page.contains("rockmap compare</title>") && !page.contains("id=\"map\""));
+    let nowhere = home.join("nowhere.gpkg");
+    let output = compare(&[
+        nowhere.to_str().unwrap(),
+        text.to_str().unwrap(),
+        "--out",
+        home.join("4").to_str().unwrap(),
+    ]);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        stderr.contains("nowhere.gpkg: cannot read: no such file"),
+        "{stderr}"
+    );
+}

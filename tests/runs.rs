@@ -471,6 +471,31 @@ fn kite_photographs_of_ground_targets() {
     }
 }
 
+/// Targets drawn back into the photographs lie on what was detected there.
+#[test]
+fn targets_lie_in_their_crops_where_they_were_detected() {
+    let Some(data) = real("copr-kite") else {
+        return;
+    };
+    let run = Run::of("pipelines/copr-kite.toml", Some(&data), &[]);
+    crops_agree_with_evidence(&run);
+    let text = fs::read_to_string(run.out().join("evidence.csv")).unwrap();
+    let mut agreeing = 0;
+    for line in text.lines().skip(1) {
+        let row: Vec<&str> = line.split(',').collect();
+        let (image_id, det_id) = (row[1], row[2]);
+        let (weight, residual_px): (f64, f64) = (row[3].parse().unwrap(), row[4].parse().unwrap());
+        // In IMG_0148 the border cuts a target, and the detector marked three of its black quarters
+        // as targets of their own; the place is right there, the marks are not.
+        if weight < 0.5 || image_id == "IMG_0148" {
+            continue;
+        }
+        assert!(residual_px < 3.0, "{image_id}/{det_id}: {residual_px} px");
+        agreeing += 1;
+    }
+    assert!(agreeing >= 57, "{agreeing}");
+}
+
 #[test]
 fn parked_cars_from_a_vehicle() {
     let Some(data) = real("kitti-0001") else {

@@ -17,7 +17,7 @@ const EXAMPLES: &str = "Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// The earlier map: the folder of a run, or a rocks.geojson
+    /// The earlier map: the folder of a run, a GeoJSON file of points or a GeoPackage
     #[arg(value_name = "A")]
     before: PathBuf,
     /// The later map, likewise

@@ -9,6 +9,7 @@
 
 mod coverage;
 mod epoch;
+mod geopackage;
 mod output;
 mod pairs;
 mod shift;

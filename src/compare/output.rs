@@ -9,9 +9,10 @@ use sha2::{Digest, Sha256};
 use super::{Change, Changes, Epoch, Status};
 use crate::error::Error;
 use crate::evaluate::Estimate;
-use crate::frame::Geodetic;
+use crate::frame::{Geodetic, Planet, Site};
 use crate::pipeline::{hexadecimal, may_replace};
 use crate::publish::layer::{Column, Geometry, Kind, lon_lat};
+use crate::publish::report::{changes_page, with_changes};
 use crate::publish::{Folder, Format, Layer, Product, qgis};
 
 /// What a row of the layer is made from.
@@ -127,8 +128,8 @@ fn offset_columns<'a>() -> Vec<OfChange<'a>> {
     ]
 }
 
-/// The files of a comparison: compare.geojson with its style, compare.csv, compare.json, and
-/// run.json, by which the folder is known.
+/// The files of a comparison: compare.geojson with its style, compare.csv, compare.json, report.html
+/// and run.json, by which the folder is known.
 ///
 /// # Errors
 /// What cannot be encoded.
@@ -139,15 +140,69 @@ pub fn products(changes: &Changes, before: &Epoch, after: &Epoch) -> Result<Vec<
     products.push(Product::new("compare.qml", qgis::qml(&layers[0])));
     let summary = summary(changes, before, after);
     products.push(Product::new("compare.json", format!("{summary:#}\n")));
+    products.push(Product::new("report.html", report(changes, before, after)));
     let manifest = json!({
         "run_id": run_id(changes, before, after),
         "program": "rockmap",
         "version": env!("CARGO_PKG_VERSION"),
         "command": "compare",
-        "outputs": ["compare.csv", "compare.geojson", "compare.json", "compare.qml", "run.json"],
+        "outputs": ["compare.csv", "compare.geojson", "compare.json", "compare.qml", "report.html", "run.json"],
     });
     products.push(Product::new("run.json", format!("{manifest:#}\n")));
     Ok(products)
+}
+
+/// The report of the later map with a section on what changed, or a page of that section alone where
+/// that map has no report.
+fn report(changes: &Changes, before: &Epoch, after: &Epoch) -> String {
+    let told = |origin: Option<Geodetic>| told(changes, (before, after), origin);
+    match &after.report {
+        Some(report) => with_changes(report.clone(), told(origin(report, before.map.planet))),
+        None => changes_page(&after.name, &told(None)),
+    }
+}
+
+/// The origin of a report's map.
+fn origin(report: &Value, planet: Planet) -> Option<Geodetic> {
+    let origin = &report["manifest"]["site"]["origin"];
+    let [lat_deg, lon_deg, height_m] =
+        ["lat_deg", "lon_deg", "height_m"].map(|key| origin[key].as_f64());
+    Some(planet.place(lat_deg?, lon_deg?, height_m?))
+}
+
+/// The comparison as a page takes it: columns with an entry an object; places are east and north
+/// of the origin (metres), by default of the first object.
+fn told(changes: &Changes, (before, after): (&Epoch, &Epoch), origin: Option<Geodetic>) -> Value {
+    let all = || before.map.estimates.iter().chain(&after.map.estimates);
+    let first = all().next().map(|e| e.place);
+    let nowhere = Geodetic::from_degrees(0.0, 0.0, 0.0);
+    let site = Site::new(before.map.planet, origin.or(first).unwrap_or(nowhere));
+    let place = |e: Option<&Estimate>| {
+        e.map(|e| {
+            let at = site.enu(Geodetic {
+                height_m: site.origin().height_m,
+                ..e.place
+            });
+            let at = at.xyz;
+            [at.x, at.y].map(|x| (x * 1e3).round() / 1e3 + 0.0)
+        })
+    };
+    let of =
+        |value: &dyn Fn(&Change) -> Value| -> Value { changes.changes.iter().map(value).collect() };
+    let was = |c: &Change| c.before.map(|i| &before.map.estimates[i]);
+    let now = |c: &Change| c.after.map(|j| &after.map.estimates[j]);
+    json!({
+        "summary": summary(changes, before, after),
+        "status": of(&|c| c.status.as_str().into()),
+        "id_a": of(&|c| json!(was(c).map(|e| &e.rock_id))),
+        "id_b": of(&|c| json!(now(c).map(|e| &e.rock_id))),
+        "p_exist_a": of(&|c| json!(was(c).and_then(|e| e.p_exist))),
+        "p_exist_b": of(&|c| json!(now(c).and_then(|e| e.p_exist))),
+        "distance_m": of(&|c| json!(c.offset_m.map(|o| o.norm()))),
+        "sigma": of(&|c| json!(c.mahalanobis)),
+        "was_m": of(&|c| json!(place(was(c)))),
+        "now_m": of(&|c| json!(place(now(c)))),
+    })
 }
 
 /// Writes a comparison's files into a folder, which appears whole or not at all.

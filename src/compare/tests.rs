@@ -42,6 +42,7 @@ fn epoch(estimates: Vec<Estimate>) -> Epoch {
         },
         coverage: None,
         sha256: String::new(),
+        report: None,
     }
 }
 

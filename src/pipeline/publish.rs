@@ -169,7 +169,8 @@ impl<'a> Map<'a> {
             let shown = layers.iter().filter(|l| l.geometry.is_some());
             products.extend(shown.map(|l| Product::new(format!("{}.qml", l.name), qgis::qml(l))));
         }
-        products.extend(self.project_file(&layers)?);
+        let has_mosaic = products.iter().any(|p| p.name == "mosaic.tif");
+        products.extend(self.project_file(&layers, has_mosaic)?);
         products.extend(self.catalogue_item(&layers, &products));
         Ok(products)
     }
@@ -188,7 +189,7 @@ impl<'a> Map<'a> {
     }
 
     /// A QGIS project over the files of the format that serves it best, if there is one.
-    fn project_file(&self, layers: &[Layer]) -> Result<Option<Product>, Error> {
+    fn project_file(&self, layers: &[Layer], has_mosaic: bool) -> Result<Option<Product>, Error> {
         let best = [Format::GeoPackage, Format::GeoJson, Format::FlatGeobuf];
         let is_written = |format: &Format| self.config.output.formats.contains(format);
         let Some(format) = best.into_iter().find(is_written) else {
@@ -199,6 +200,7 @@ impl<'a> Map<'a> {
             layers,
             format,
             site: self.scene.site,
+            has_mosaic,
         };
         Ok(Some(Product::new("rockmap.qgz", qgis::qgz(&project)?)))
     }

@@ -13,18 +13,26 @@ pub(super) struct Correction {
     pub(super) shift_m: f64,
     /// Of its attitude, radians.
     pub(super) turn: f64,
+    /// Of its position to the east, north and up at the platform, metres; of its attitude about the
+    /// body's axes (roll, pitch, yaw), radians.
+    pub(super) parts: [f64; 6],
 }
 
 impl Scene<'_> {
     /// How far the pose of a view was corrected; `None` where poses are as measured.
     pub(super) fn correction(&self, view: usize) -> Option<Correction> {
         let from = self.measured?.get(view)?.pose.enu_from_body;
-        let to = self.views[view].pose.enu_from_body;
+        let view = &self.views[view];
+        let to = view.pose.enu_from_body;
+        let shift = view.enu_from_local.inverse() * (to.translation - from.translation);
         let turn = from.rotation.inverse() * to.rotation;
+        // By the quaternion: the matrix of a small turn has no digits of its angle.
+        let about = turn.quaternion().scaled_axis();
+        let by = shift.xyz;
         Some(Correction {
-            shift_m: (to.translation - from.translation).norm(),
-            // By the quaternion: the matrix of a small turn has no digits of its angle.
+            shift_m: by.norm(),
             turn: turn.quaternion().angle(),
+            parts: [by.x, by.y, by.z, about.x, about.y, about.z],
         })
     }
 

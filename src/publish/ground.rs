@@ -178,8 +178,15 @@ fn on_the_map(unrolled: &Polygon<f64>) -> Vec<Polygon<f64>> {
     if min.x >= -180.0 && max.x <= 180.0 {
         return simple(&unrolled.clone().into()).0;
     }
+    // Near a pole an area spans many longitudes and hardly any latitude: both are stretched alike for
+    // the 30 bits of the Boolean operations.
+    let stretch = bounds.width() / bounds.height().max(1e-12);
+    let flat = unrolled.map_coords(|c| Coord {
+        x: c.x,
+        y: (c.y - min.y) * stretch,
+    });
     // As narrow as it may be: a wider box would cost the intersection decimals.
-    let margin = bounds.width().max(bounds.height());
+    let margin = bounds.width();
     // What the intersection's 30 bits make of a longitude on the cut.
     let hair_deg = 1e-8 * margin + 1e-11;
     let parts = TURNS.into_iter().flat_map(|turn| {
@@ -188,11 +195,11 @@ fn on_the_map(unrolled: &Polygon<f64>) -> Vec<Polygon<f64>> {
         if west >= max.x || east <= min.x {
             return Vec::new();
         }
-        let page = Rect::new((west, min.y - margin), (east, max.y + margin));
-        let part = unrolled.intersection(&page.to_polygon());
+        let page = Rect::new((west, -margin), (east, 2.0 * margin));
+        let part = flat.intersection(&page.to_polygon());
         simple(&part.map_coords(|c| Coord {
             x: to_edge(c.x - turn, hair_deg),
-            y: c.y,
+            y: min.y + c.y / stretch,
         }))
         .0
     });
@@ -281,6 +288,35 @@ mod tests {
             let coords: Vec<_> = drawn.0[0].exterior().coords().copied().collect();
             let at_pole = coords.iter().filter(|c| c.y.abs() == 90.0).count();
             assert!(at_pole >= 2, "{lat}: {coords:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_cut_beside_a_pole_keeps_its_corners() {
+        for lat in [90.0, -90.0] {
+            let site = Site::new(Planet::EARTH, Geodetic::from_degrees(lat, 0.0, 0.0));
+            let cartographer = Cartographer {
+                site: &site,
+                up_m: &|_, _| 0.0,
+            };
+            // A disc on the side of the antimeridian, which passes the pole at 5 cm.
+            let middle = site.enu(Geodetic::from_degrees(
+                lat - 0.15 / 111_694.0 * lat.signum(),
+                180.0,
+                0.0,
+            ));
+            let disc = ring(0.1).map_coords(|c| Coord {
+                x: c.x + middle.xyz.x,
+                y: c.y + middle.xyz.y,
+            });
+            let drawn = cartographer.area(&disc);
+            assert_eq!(drawn.0.len(), 2);
+            let corners = drawn.0.iter().flat_map(|p| p.exterior().coords());
+            for c in corners.filter(|c| c.x.abs() < 180.0) {
+                let at = site.enu(Geodetic::from_degrees(c.y, c.x, 0.0));
+                let off_m = at.horizontal_distance(middle) - 0.1;
+                assert!(off_m.abs() < 3e-4, "{lat}: {off_m} m at {c:?}");
+            }
         }
     }
 

@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Matrix2;
 
 use super::Scene;
+use super::residual::{Extent, extent};
 use crate::detection::{Detection, Mark};
 use crate::frame::{Ellipse, Enu, Geodetic, Pixel, Point, covariance_ellipse};
-use crate::fuse::Object;
+use crate::fuse::{Member, Object};
 use crate::pose::Time;
 use crate::view::View;
 
@@ -35,6 +36,8 @@ pub struct Rock {
     pub n_detections: usize,
     /// Weighted mean of the diameters its detections give, metres.
     pub diameter_m: Option<f64>,
+    /// How large its whole boxes are.
+    pub(crate) extent: Option<Extent>,
     /// Score of its largest member.
     pub score: Option<f64>,
     /// The view in which it appears largest.
@@ -54,7 +57,8 @@ pub struct Evidence {
     pub view: usize,
     /// Membership probability.
     pub weight: f64,
-    /// From the mark to the rock drawn back into the picture, pixels.
+    /// From the mark to the rock drawn back into the picture, pixels; a box that the picture's
+    /// border cuts is made whole first.
     pub residual_px: Option<f64>,
     /// From the detection's place to the rock's on the ground, metres.
     pub residual_m: f64,
@@ -78,10 +82,12 @@ pub(super) fn rocks(scene: &Scene<'_>, objects: &[Object]) -> Vec<Rock> {
 
 fn rock(scene: &Scene<'_>, object: &Object, rock_id: String) -> Rock {
     let geodetic = scene.site.geodetic(object.place);
+    let diameter_m = diameter(scene, &object.members);
+    let extent = extent(scene, &object.members, diameter_m);
     let evidence: Vec<Evidence> = object
         .members
         .iter()
-        .map(|m| evidence(scene, object.place, m.observation, m.weight))
+        .map(|member| evidence(scene, object.place, member, extent))
         .collect();
     let firm: Vec<&Evidence> = evidence.iter().filter(|e| e.is_firm()).collect();
     let detected_by: BTreeSet<usize> = firm.iter().map(|e| e.view).collect();
@@ -99,7 +105,8 @@ fn rock(scene: &Scene<'_>, object: &Object, rock_id: String) -> Rock {
         geodetic,
         ellipse: local_ellipse(scene, object, geodetic),
         n_detections: firm.len(),
-        diameter_m: diameter(scene, &evidence),
+        diameter_m,
+        extent,
         score: largest_score(scene, &evidence),
         best_view: best_view(scene, &firm),
         seen: times.iter().min().copied().zip(times.iter().max().copied()),
@@ -119,16 +126,19 @@ fn local_ellipse(scene: &Scene<'_>, object: &Object, place: Geodetic) -> Ellipse
     covariance_ellipse(covariance.fixed_view::<2, 2>(0, 0).into_owned())
 }
 
-fn evidence(scene: &Scene<'_>, place: Point<Enu>, placed: usize, weight: f64) -> Evidence {
-    let found = &scene.placed[placed];
-    let view = &scene.views[found.view];
-    let mark = found.detection.aim_point(scene.aim);
-    let drawn = project(view, place).map(|(pixel, _)| pixel);
+fn evidence(
+    scene: &Scene<'_>,
+    place: Point<Enu>,
+    member: &Member,
+    extent: Option<Extent>,
+) -> Evidence {
+    let found = &scene.placed[member.observation];
+    let seen = (&scene.views[found.view], &found.detection);
     Evidence {
-        placed,
+        placed: member.observation,
         view: found.view,
-        weight,
-        residual_px: mark.zip(drawn).map(|(a, b)| a.distance(b)),
+        weight: member.weight,
+        residual_px: scene.residual_px(seen, place, extent),
         residual_m: found.hit.point.horizontal_distance(place),
     }
 }
@@ -145,20 +155,20 @@ pub(super) fn project_covariance(
 }
 
 /// Where a place appears in a view's picture, with the derivative of the pixel by the place.
-fn project(view: &View, place: Point<Enu>) -> Option<(Pixel, nalgebra::Matrix2x3<f64>)> {
+pub(super) fn project(view: &View, place: Point<Enu>) -> Option<(Pixel, nalgebra::Matrix2x3<f64>)> {
     let camera = view.camera.as_ref()?;
     let camera_from_enu = view.enu_from_camera()?.inverse();
     let (pixel, by_point) = camera.pixel_with_jacobian(camera_from_enu * place).ok()?;
     Some((pixel, by_point * camera_from_enu.rotation.matrix()))
 }
 
-fn diameter(scene: &Scene<'_>, evidence: &[Evidence]) -> Option<f64> {
+fn diameter(scene: &Scene<'_>, members: &[Member]) -> Option<f64> {
     let mut sum = 0.0;
     let mut weight = 0.0;
-    for e in evidence {
-        if let Some(d) = scene.placed[e.placed].diameter_m {
-            sum += e.weight * d;
-            weight += e.weight;
+    for member in members {
+        if let Some(d) = scene.placed[member.observation].diameter_m {
+            sum += member.weight * d;
+            weight += member.weight;
         }
     }
     (weight > 0.0).then(|| sum / weight)

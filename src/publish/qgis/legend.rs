@@ -41,7 +41,7 @@ const AMBER: Rgba = (217, 119, 6, 200);
 pub(super) fn rules(layer: &Layer) -> Vec<Rule> {
     match layer.name {
         "rocks" => rocks(layer),
-        "ellipses" => one(Symbol::area((190, 24, 93, 0), (190, 24, 93, 210), 0.15)),
+        "ellipses" => one(Symbol::outline((190, 24, 93, 255), 0.2)),
         "footprints" => one(footprint(layer.features.len())),
         "views" => one(view(layer.features.len())),
         "traverse" => one(Symbol::way(INK, 0.5)),
@@ -111,17 +111,28 @@ fn one(symbol: Symbol) -> Vec<Rule> {
 fn rocks(layer: &Layer) -> Vec<Rule> {
     let classes = texts(layer, "class");
     let has_existence = column(layer, "p_exist").any(|v| *v != Value::Null);
-    let sure = |label: &str, filter: &str, i: usize| Rule {
+    let stone = |label: &str, filter: &str, fill: Rgba| Rule {
         label: label.to_owned(),
         filter: filter.to_owned(),
-        symbol: Symbol::stone(SURE_TO_DOUBTFUL[i]),
+        symbol: Symbol::stone(fill),
+    };
+    let sure = |label: &str, filter: &str, i: usize| stone(label, filter, SURE_TO_DOUBTFUL[i]);
+    // Bright colours catch the eye; what is doubtful shall not do so more than what is sure.
+    let doubtful = |label: &str, filter: &str, i: usize, opacity: u8| {
+        let (r, g, b, _) = SURE_TO_DOUBTFUL[i];
+        stone(label, filter, (r, g, b, opacity))
     };
     if has_existence {
         return vec![
             sure("exists, 0.9 to 1", "\"p_exist\" >= 0.9", 0),
             sure("0.5 to 0.9", "\"p_exist\" >= 0.5 AND \"p_exist\" < 0.9", 1),
-            sure("0.2 to 0.5", "\"p_exist\" >= 0.2 AND \"p_exist\" < 0.5", 2),
-            sure("below 0.2", "\"p_exist\" < 0.2", 3),
+            doubtful(
+                "0.2 to 0.5",
+                "\"p_exist\" >= 0.2 AND \"p_exist\" < 0.5",
+                2,
+                190,
+            ),
+            doubtful("below 0.2", "\"p_exist\" < 0.2", 3, 140),
         ];
     }
     if classes.len() > 1 {

@@ -24,6 +24,8 @@ pub struct Project<'a> {
     pub format: Format,
     /// The site, which the project's coordinate reference system is centred on.
     pub site: &'a Site,
+    /// Whether the ground mosaic lies beside the project; it is drawn under everything else.
+    pub has_mosaic: bool,
 }
 
 /// Layers from the top of the map to its bottom; those first that others must not cover.
@@ -38,6 +40,12 @@ const ORDER: [&str; 6] = [
 
 /// What the ids of layers begin with: QGIS ignores ids of ten characters or fewer.
 const ID: &str = "rockmap_";
+
+/// The file of the ground mosaic.
+const MOSAIC: &str = "mosaic.tif";
+
+/// What a style says of a layer that hides what is under it.
+const OPAQUE: &str = "<layerOpacity>1</layerOpacity>";
 
 /// The least extent of the map, metres.
 const LEAST_EXTENT_M: f64 = 10.0;
@@ -90,7 +98,12 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
          <title>{title}</title>\n<projectCrs>\n{local}</projectCrs>\n<layer-tree-group>\n"
     );
     let has_rocks = layers.iter().any(|l| l.name == "rocks");
-    let is_hidden = |layer: &Layer| layer.name == "detections" && has_rocks;
+    // Footprints would tint the mosaic, whose own outline shows what was seen.
+    let is_hidden = |layer: &Layer| match layer.name {
+        "detections" => has_rocks,
+        "footprints" => project.has_mosaic,
+        _ => false,
+    };
     // Writing to a String cannot fail.
     for layer in &layers {
         let _ = writeln!(
@@ -108,6 +121,13 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
             i32::from(layer.name == "rocks"),
         );
     }
+    if project.has_mosaic {
+        let _ = writeln!(
+            text,
+            "<layer-tree-layer id=\"{ID}mosaic\" name=\"Mosaic\" providerKey=\"gdal\" \
+             source=\"./{MOSAIC}\" checked=\"Qt::Checked\" expanded=\"0\"/>"
+        );
+    }
     let _ = write!(
         text,
         "</layer-tree-group>\n<mapcanvas name=\"theMapCanvas\">\n<units>meters</units>\n\
@@ -116,7 +136,15 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
         corners(&extent)
     );
     for layer in &layers {
-        text.push_str(&map_layer(project.format, layer, &geographic));
+        let mut shown = map_layer(project.format, layer, &geographic);
+        if project.has_mosaic && layer.name == "rocks" {
+            // So that the rocks of the pictures show through their discs.
+            shown = shown.replace(OPAQUE, "<layerOpacity>0.5</layerOpacity>");
+        }
+        text.push_str(&shown);
+    }
+    if project.has_mosaic {
+        text.push_str(&mosaic_layer(&local));
     }
     text.push_str(&properties(&extent, &local));
     Ok(text)
@@ -226,6 +254,23 @@ fn map_layer(format: Format, layer: &Layer, crs: &CrsText) -> String {
         escaped(layer.title),
         system(crs, true),
         style(layer)
+    )
+}
+
+/// The mosaic as a layer: its red, green and blue as they are, what no picture shows clear.
+fn mosaic_layer(local: &str) -> String {
+    format!(
+        "<maplayer type=\"raster\" hasScaleBasedVisibilityFlag=\"0\">\n<id>{ID}mosaic</id>\n\
+         <datasource>./{MOSAIC}</datasource>\n<layername>Mosaic</layername>\n<srs>\n{local}</srs>\n\
+         <provider>gdal</provider>\n<pipe>\n\
+         <provider><resampling enabled=\"false\" zoomedInResamplingMethod=\"nearestNeighbour\" \
+         zoomedOutResamplingMethod=\"nearestNeighbour\" maxOversampling=\"2\"/></provider>\n\
+         <rasterrenderer type=\"multibandcolor\" redBand=\"1\" greenBand=\"2\" blueBand=\"3\" \
+         alphaBand=\"4\" opacity=\"1\" nodataColor=\"\"><rasterTransparency/></rasterrenderer>\n\
+         <brightnesscontrast brightness=\"0\" contrast=\"0\" gamma=\"1\"/>\n\
+         <huesaturation saturation=\"0\" grayscaleMode=\"0\" colorizeOn=\"0\"/>\n\
+         <rasterresampler maxOversampling=\"2\" zoomedOutResampler=\"bilinear\"/>\n\
+         </pipe>\n<blendMode>0</blendMode>\n</maplayer>\n"
     )
 }
 

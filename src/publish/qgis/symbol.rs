@@ -67,6 +67,19 @@ impl Symbol {
         }
     }
 
+    /// An edge in a white casing around nothing, which shows on dark and on light.
+    pub(super) fn outline(colour: Rgba, width_mm: f64) -> Self {
+        let (clear, casing) = ((255, 255, 255, 0), (255, 255, 255, 170));
+        let ring = |edge: Rgba, width_mm: f64| Part::Area {
+            fill: clear,
+            edge,
+            width_mm,
+        };
+        Self {
+            parts: vec![ring(casing, width_mm * 2.6), ring(colour, width_mm)],
+        }
+    }
+
     /// An area with an edge.
     pub(super) fn area(fill: Rgba, edge: Rgba, width_mm: f64) -> Self {
         Self::of(Part::Area {

@@ -66,6 +66,10 @@ fn a_style_is_well_formed_and_escaped() {
 }
 
 fn project(planet: Planet, place: Geodetic, format: Format) -> String {
+    project_over(planet, place, format, false)
+}
+
+fn project_over(planet: Planet, place: Geodetic, format: Format, has_mosaic: bool) -> String {
     let layers = [rocks(planet, &[])];
     let site = Site::new(planet, place);
     let project = Project {
@@ -73,6 +77,7 @@ fn project(planet: Planet, place: Geodetic, format: Format) -> String {
         layers: &layers,
         format,
         site: &site,
+        has_mosaic,
     };
     let bytes = qgz(&project).unwrap();
     assert_eq!(bytes, qgz(&project).unwrap());
@@ -115,4 +120,18 @@ fn other_planets_and_poles_are_shown_about_their_own_site() {
     let moon = project(Planet::MOON, pole, Format::GeoPackage);
     assert!(moon.contains("Sphere / Ocentric, about the site"));
     assert!(moon.contains("<authid>IAU_2015:30100</authid>") && !moon.contains("WGS"));
+}
+
+#[test]
+fn the_mosaic_lies_under_everything_else() {
+    let place = Geodetic::from_degrees(49.0, 8.4, 0.0);
+    let alone = project(Planet::EARTH, place, Format::GeoPackage);
+    assert!(!alone.contains("mosaic") && !alone.contains("<layerOpacity>0.5"));
+    let text = project_over(Planet::EARTH, place, Format::GeoPackage, true);
+    let tree = text.split("</layer-tree-group>").next().unwrap();
+    let last = tree.rsplit("<layer-tree-layer ").next().unwrap();
+    assert!(last.contains("source=\"./mosaic.tif\""), "{last}");
+    assert!(text.contains(
+        "type=\"multibandcolor\" redBand=\"1\" greenBand=\"2\" blueBand=\"3\" alphaBand=\"4\""
+    ));
 }

@@ -9,6 +9,7 @@ use super::packed::base64;
 use crate::detection::{Mark, PixelBox};
 use crate::frame::Pixel;
 use crate::publish::annotated::apparent_radius_px;
+use crate::publish::residual::whole_box;
 use crate::publish::rock::project_covariance;
 use crate::publish::{Picture, Rock, Scene};
 use crate::view::View;
@@ -76,7 +77,8 @@ struct Wanted {
     place_px: [f64; 2],
     /// Covariance there, px^2: of columns, of both, of rows.
     covariance_px2: [f64; 3],
-    /// The detector's box: left, upper, right, lower edge, pixels; for a point, twice the point.
+    /// The detector's box: left, upper, right, lower edge, pixels; for a point, twice the point. One
+    /// that the picture's border cuts is as large as if the picture went on.
     mark_px: Option<[f64; 4]>,
 }
 
@@ -251,7 +253,9 @@ fn wanted(
         window: window(centre, extent.max(MIN_HALF_PX), size)?,
         place_px: [hundredths(place.u), hundredths(place.v)],
         covariance_px2: upper(&covariance),
-        mark_px: mark.map(|b| [b.x_min, b.y_min, b.x_max, b.y_max].map(hundredths)),
+        mark_px: mark
+            .map(|b| whole_box(b, view, (rock.object.place, place), rock.extent).unwrap_or(b))
+            .map(|b| [b.x_min, b.y_min, b.x_max, b.y_max].map(hundredths)),
     })
 }
 

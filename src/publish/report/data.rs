@@ -12,10 +12,12 @@ use super::coverage::{Coverage, coverage};
 use super::crops::{Crop, Limits};
 use super::packed::Packed;
 use crate::footprint::Footprint;
+use crate::frame::{Enu, Point};
 use crate::input::{Reason, Reject};
-use crate::publish::layer::{self, Layer};
+use crate::publish::layer;
 use crate::publish::rock::Evidence;
 use crate::publish::{Rock, Scene};
+use crate::view::View;
 
 /// Outlines of footprints may deviate by this share of their size, or by [`FINE_M`].
 const SIMPLER: f64 = 0.002;
@@ -27,6 +29,7 @@ const MAX_REJECTS: usize = 200;
 const BINS: u32 = 30;
 /// Bins of a histogram of counts.
 const COUNT_BINS: usize = 40;
+const DEG_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
 /// Abundances whose laws are drawn beside the measured sizes.
 const ABUNDANCES: [f64; 4] = [0.03, 0.1, 0.2, 0.4];
 
@@ -108,6 +111,11 @@ struct Views<'a> {
     /// How far poses were corrected; NaN where they are as measured.
     shift_m: Packed,
     turn_deg: Packed,
+    /// East, north, up at the platform, metres, and roll, pitch, yaw, degrees, of each correction
+    /// in turn; NaN likewise.
+    correction: Packed,
+    /// How far along its platform's way the view is, metres.
+    along_m: Packed,
     /// Where the rings of each footprint begin in `rings`, where each ring in `corners`, and
     /// these: east and north in turn, metres.
     footprints: Packed,
@@ -208,7 +216,7 @@ fn views<'a>(scene: &'a Scene<'a>, run: &'a Run<'a>) -> Views<'a> {
     let grounds = scene.footprints.all().iter().map(Footprint::ground);
     let all: Vec<Vec<Ring>> = grounds.map(outline).collect();
     let flat = || all.iter().flatten();
-    let layer = scene.view_layer();
+    let corrections: Vec<_> = (0..views.len()).map(|v| scene.correction(v)).collect();
     Views {
         id: views.iter().map(|v| v.image_id.as_str()).collect(),
         camera: views.iter().map(|v| v.camera_name()).collect(),
@@ -222,8 +230,13 @@ fn views<'a>(scene: &'a Scene<'a>, run: &'a Run<'a>) -> Views<'a> {
         yaw_deg: Packed::f32(views.iter().map(|v| v.yaw().map(f64::to_degrees))),
         area_m2: Packed::f32(scene.footprints.all().iter().map(|f| Some(f.area_m2()))),
         n_detections: Packed::indices(detections_by_view(scene).into_iter().map(Some)),
-        shift_m: Packed::f32(column(&layer, scene, "pose_shift_m")),
-        turn_deg: Packed::f32(column(&layer, scene, "pose_turn_deg")),
+        shift_m: Packed::f32(corrections.iter().map(|c| c.map(|c| c.shift_m))),
+        turn_deg: Packed::f32(corrections.iter().map(|c| c.map(|c| c.turn.to_degrees()))),
+        correction: Packed::f32(corrections.iter().flat_map(|c| {
+            let of = |i: usize| c.map(|c| c.parts[i] * if i < 3 { 1.0 } else { DEG_PER_RAD });
+            [0, 1, 2, 3, 4, 5].map(of)
+        })),
+        along_m: Packed::f32(along_m(views).into_iter().map(Some)),
         footprints: Packed::offsets(all.iter().map(Vec::len)),
         rings: Packed::offsets(flat().map(Vec::len)),
         corners: Packed::f32(flat().flatten().flatten().map(|&x| Some(x))),
@@ -246,23 +259,17 @@ fn outline(area: &MultiPolygon<f64>) -> Vec<Ring> {
     rings
 }
 
-/// The numbers of a layer of views, in the order of the views.
-fn column(layer: &Layer, scene: &Scene<'_>, name: &str) -> Vec<Option<f64>> {
-    let Some(at) = layer.fields.iter().position(|f| f.name == name) else {
-        return vec![None; scene.views.len()];
-    };
-    let by_id: BTreeMap<&str, f64> = layer
-        .features
-        .iter()
-        .filter_map(|feature| match feature.values.get(at) {
-            Some(layer::Value::Real(x)) => Some((feature.id.as_str(), *x)),
-            _ => None,
-        })
-        .collect();
-    let views = scene.views.iter();
-    views
-        .map(|v| by_id.get(v.image_id.as_str()).copied())
-        .collect()
+/// How far along the way of its platform each view is, metres.
+fn along_m(views: &[View]) -> Vec<f64> {
+    let mut so_far: BTreeMap<Option<&str>, (Point<Enu>, f64)> = BTreeMap::new();
+    let places = views.iter().map(|view| {
+        let here = view.pose.enu_from_body.origin();
+        let before = so_far.get(&view.platform.as_deref());
+        let along = before.map_or(0.0, |&(last, along)| along + last.distance(here));
+        so_far.insert(view.platform.as_deref(), (here, along));
+        along
+    });
+    places.collect()
 }
 
 fn detections_by_view(scene: &Scene<'_>) -> Vec<usize> {

@@ -22,14 +22,26 @@ const PAGE: &str = include_str!("report.html");
 /// Its style.
 const STYLE: &str = include_str!("report.css");
 /// Its scripts, in the order in which they stand in the page.
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 8] = [
+    include_str!("elements.js"),
     include_str!("data.js"),
     include_str!("grid.js"),
     include_str!("map.js"),
     include_str!("rock.js"),
     include_str!("charts.js"),
+    include_str!("changes.js"),
     include_str!("page.js"),
 ];
+/// The page of a comparison by itself, and its scripts.
+const CHANGES_PAGE: &str = include_str!("changes.html");
+const CHANGES_SCRIPTS: [&str; 4] = [
+    include_str!("elements.js"),
+    include_str!("charts.js"),
+    include_str!("changes.js"),
+    include_str!("changes_page.js"),
+];
+/// What stands around the data in a page.
+const DATA_MARKS: (&str, &str) = ("id=\"data\">", "</script>");
 
 /// What the report says of the run beside the map.
 pub struct Run<'a> {
@@ -55,15 +67,45 @@ impl Scene<'_> {
     }
 }
 
+/// The report of a run as its page holds it; `None` where the page is of another version of the
+/// program, whose scripts would not know what this one says.
+pub fn held(page: &str) -> Option<Value> {
+    let (_, rest) = page.split_once(DATA_MARKS.0)?;
+    let (data, _) = rest.split_once(DATA_MARKS.1)?;
+    let data: Value = serde_json::from_str(data).ok()?;
+    (data["manifest"]["version"] == env!("CARGO_PKG_VERSION")).then_some(data)
+}
+
+/// A report with a section on what changed since an earlier map. It stands in another folder than its
+/// annotated pictures, and does not lead to them.
+pub fn with_changes(mut report: Value, changes: Value) -> String {
+    if let Some(pictures) = report["views"]["picture"].as_array_mut() {
+        pictures.fill(Value::Null);
+    }
+    report["changes"] = changes;
+    let title = report["title"].as_str().unwrap_or("map").to_owned();
+    page(&title, &report.to_string())
+}
+
+/// A page of what changed, by itself.
+pub fn changes_page(title: &str, changes: &Value) -> String {
+    let data = serde_json::json!({ "changes": changes }).to_string();
+    filled(CHANGES_PAGE, title, &data, &CHANGES_SCRIPTS)
+}
+
 /// The page of these data.
 fn page(title: &str, data: &str) -> String {
+    filled(PAGE, title, data, &SCRIPTS)
+}
+
+fn filled(template: &str, title: &str, data: &str, of: &[&str]) -> String {
     // Within a script "<" could end it.
     let data = data.replace('<', "\\u003c");
     let mut scripts = String::from("\"use strict\";\n");
-    for script in SCRIPTS {
+    for script in of {
         scripts.push_str(script);
     }
-    let mut rest = PAGE;
+    let mut rest = template;
     let mut html = String::with_capacity(data.len() + 100_000);
     let parts = [
         ("{{title}}", escaped(title)),

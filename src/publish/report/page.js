@@ -16,12 +16,12 @@ function distributions() {
   const last = "The last bar holds everything beyond it, too.";
   fill("distributions", "No rocks.", [
     ...(c.sizes ? sizeCharts(c.sizes, c.laws) : []),
-    of("Existence", c.existence, ["probability", "rocks"]),
-    of("Residuals in pictures", c.residual_px, ["px", "detections"], `From each detection to its rock drawn back into the picture. ${last}`),
-    of("Residuals on the ground", c.residual_m, ["m", "detections"], `From each detection\u2019s place to its rock\u2019s. ${last}`),
-    of("Views that saw a rock", c.views_by_rock, ["views", "rocks"]),
-    of("Detections of a view", c.detections_by_view, ["detections", "views"]),
-    lines("Detections along the traverse", [{ name: "detections", points: [...VIEWS.n_detections].map((n, k) => [k, n]) }], ["view", "detections"]),
+    of("Existence", c.existence, ["probability of existence", "rocks"]),
+    of("Residuals in pictures", c.residual_px, ["residual, px", "detections"], `From each detection to its rock drawn back into the picture. ${last}`),
+    of("Residuals on the ground", c.residual_m, ["residual, m", "detections"], `From each detection\u2019s place to its rock\u2019s. ${last}`),
+    of("Views that saw a rock", c.views_by_rock, ["views that saw it", "rocks"]),
+    of("Detections of a view", c.detections_by_view, ["detections of a view", "views"]),
+    lines("Detections along the traverse", [{ name: "detections", points: [...VIEWS.n_detections].map((n, k) => [k + 1, n]) }], ["view", "detections on the ground"], { from_zero: true }),
   ]);
 }
 
@@ -37,16 +37,25 @@ function coverageCharts() {
   const words = `Counted on a grid of ${digits(COVERAGE.columns)} \u00d7 ${digits(COVERAGE.rows)} cells of ${metres(COVERAGE.cell_m)}, which the map shades.`;
   fill("coverage", "", [
     make("div", { class: "card" }, table(["views", "m\u00b2", "of what is seen"], rows), make("p", { class: "quiet" }, words)),
-    lines("Ground seen by at least so many views", [{ name: "area", points: areas.map((area, k) => [k + 1, area]) }], ["views", "m\u00b2"]),
+    lines("Ground seen by at least so many views", [{ name: "area", points: areas.map((area, k) => [k + 1, area]) }], ["views", "ground seen, m\u00b2"], { from_zero: true, dotted: true }),
   ]);
 }
 
+// The six corrections of every pose along the way of its platform.
 function poses() {
-  const series = (column) => [...column].map((x, k) => [k, x]).filter((p) => !Number.isNaN(p[1]));
-  const [shift, turn] = [series(VIEWS.shift_m), series(VIEWS.turn_deg)];
-  fill("poses", "Poses are as measured: the method does not correct any.", [
-    lines("How far poses were moved", [{ name: "shift", points: shift }], ["view", "m"]),
-    lines("How far poses were turned", [{ name: "turn", points: turn }], ["view", "degrees"]),
+  if (VIEWS.correction.every(Number.isNaN)) return fill("poses", "Poses are as measured: the method does not correct any.", []);
+  const by_way = WAYS.length === 1 && VIEWS.along_m[VIEWS.along_m.length - 1] > 0;
+  const at = (k) => (by_way ? VIEWS.along_m[k] : k + 1);
+  const of = (names, first, factor) => names.map((name, i) => ({
+    name, kind: SERIES[i], points: VIEWS.id.map((_, k) => [at(k), factor * VIEWS.correction[6 * k + first + i]]),
+  }));
+  const where = by_way ? "way along the traverse, m" : "view";
+  const options = { from_zero: true, dotted: true };
+  fill("poses", "", [
+    lines("Corrections of position", of(["east", "north", "up"], 0, 100), [where, "corrected by, cm"], { ...options, words: "From the measured place of the platform to the corrected one." }),
+    lines("Corrections of attitude", of(["roll", "pitch", "yaw"], 3, 1), [where, "corrected by, degrees"], { ...options, words: "About the axes of the platform: forward, left and up." }),
+    bars("How far poses were moved", spread([...VIEWS.shift_m].map((x) => 100 * x)), ["shift, cm", "views"]),
+    bars("How far poses were turned", spread([...VIEWS.turn_deg]), ["turn, degrees", "views"]),
   ]);
 }
 
@@ -60,21 +69,25 @@ function rejects() {
   fill("rejects", "", [table(["reason", "records"], reasons.map(([reason, count]) => [reason, digits(count)])), list]);
 }
 
-// What a solver says of itself, whatever it is: numbers as a list, rows of numbers as charts.
+// What the numbers of a solver's lists are.
+const PARTS = {
+  noise_scales: ["column or bearing", "row", "size", "range"],
+  pose_scales: ["east", "north", "up", "roll", "pitch", "yaw"],
+  scores: ["mean logit of objects", "mean logit of clutter", "variance"],
+};
+
+// What a solver says of itself, whatever it is: numbers as a list, what has a curve as a chart.
 function solver() {
   const parts = [];
-  for (const [k, evidence] of (DATA.manifest.solver ?? []).entries()) {
-    const name = evidence.class === undefined ? `Part ${k + 1}` : `Class ${ROCKS.classes[evidence.class] ?? "none"}`;
-    parts.push(make("div", { class: "card" }, make("h3", {}, name), listed(Object.fromEntries(Object.entries(evidence).filter(([, value]) => !isCurve(value))))));
-    for (const [key, value] of Object.entries(evidence)) {
-      if (isCurve(value)) parts.push(lines(`${name}: ${key.replaceAll("_", " ")}`, [{ name: key, points: value.map((y, i) => [i + 1, y]) }], ["iteration", key]));
-    }
+  for (const evidence of DATA.manifest.solver ?? []) {
+    const name = evidence.class === undefined ? "Belief fusion" : `Class ${ROCKS.classes[evidence.class] ?? "none"}`;
+    const { log_likelihood: likelihood, detectability, ...rest } = evidence;
+    const named = Object.entries(rest).map(([key, value]) => [key, PARTS[key] && Array.isArray(value) ? Object.fromEntries(value.map((x, i) => [PARTS[key][i] ?? i + 1, x])) : value]);
+    parts.push(make("div", { class: "card" }, make("h3", {}, name), listed(Object.fromEntries(named))));
+    if (likelihood?.length > 1) parts.push(lines(`${name}: likelihood`, [{ name: "log likelihood", points: likelihood.map((y, i) => [i + 1, y]) }], ["iteration", "log likelihood"]));
+    if (detectability?.length > 1) parts.push(lines("Probability of detection", [{ name: "probability", points: detectability.map((y, i) => [i + 1, y]) }], ["bin of apparent size, or of range", "probability"], { range: [0, 1], dotted: true, words: "As learnt, in equal bins of the logarithm of the apparent size from small to large, or where marks have none, of the range from near to far." }));
   }
   fill("solver", "Nothing was solved.", parts);
-}
-
-function isCurve(value) {
-  return Array.isArray(value) && value.length > 1 && value.every(Number.isFinite);
 }
 
 // Any value of run.json as a list of names and values.
@@ -275,6 +288,13 @@ controls();
 // The map is drawn first; what lies below the fold follows.
 requestAnimationFrame(() => setTimeout(() => {
   performance.mark("map drawn");
+  if (DATA.changes) {
+    byId("changes-part").hidden = false;
+    showChanges(DATA.changes, (id) => {
+      choose(ROCKS.id.indexOf(id), true);
+      byId("map").scrollIntoView({ block: "center" });
+    });
+  }
   distributions();
   coverageCharts();
   poses();

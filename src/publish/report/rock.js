@@ -90,7 +90,7 @@ function cropFigure(i, crop) {
     ? make("a", { href: path.split("/").map(encodeURIComponent).join("/"), target: "_blank", rel: "noopener" }, image_id)
     : image_id;
   return make("figure", {}, cropPicture(crop, said),
-    make("figcaption", {}, name, make("br"), crop.detection === null ? "missed" : `${digits(residual)} px off \u00b7 ${digits(DETECTIONS.range_m[crop.detection])} m`));
+    make("figcaption", {}, name, make("br"), crop.detection === null ? "missed" : `${residual.toFixed(1)}\u00a0px off, ${digits(DETECTIONS.range_m[crop.detection])}\u00a0m`));
 }
 
 // Pixels of the picture are the units of the drawing; a pixel's middle has whole coordinates.
@@ -124,9 +124,9 @@ function members(i) {
   const rows = [];
   for (let k = ROCKS.members[i]; k < ROCKS.members[i + 1]; k++) {
     const d = ROCKS.member[k];
-    rows.push([VIEWS.id[DETECTIONS.view[d]], DETECTIONS.id[d], digits(ROCKS.weight[k], 3), digits(ROCKS.residual_px[k]), digits(100 * ROCKS.residual_m[k]), digits(DETECTIONS.range_m[d]), digits(DETECTIONS.score[d], 2)]);
+    rows.push([VIEWS.id[DETECTIONS.view[d]], DETECTIONS.id[d], digits(ROCKS.weight[k], 3), fixed(ROCKS.residual_px[k], 2), fixed(100 * ROCKS.residual_m[k], 1), digits(DETECTIONS.range_m[d]), digits(DETECTIONS.score[d], 2)]);
   }
-  return table(["view", "detection", "weight", "px", "cm", "range, m", "score"], rows, 2);
+  return table(["view", "mark", "weight", "px", "cm", "range, m", "score"], rows, 2);
 }
 
 function covariance(i) {
