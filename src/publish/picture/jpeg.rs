@@ -26,6 +26,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     let (width, height) = size(&mut Cursor::new(bytes))?;
     let mut rgba = vec![0; pixel_count(width, height)? * 4];
     let mut decompressor = Decompressor::new().map_err(|e| problem(&e))?;
+    let header = decompressor.read_header(bytes);
     let decoded = decompressor.decompress(
         bytes,
         Image {
@@ -42,12 +43,17 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     }
     let mut picture = Picture::from_parts(width, height, rgba);
     picture.metadata = metadata(bytes);
+    picture.colour = match header.map(|header| header.subsamp) {
+        // What is drawn on a grey picture is in colour.
+        Ok(Subsamp::Gray) | Err(_) => Subsamp::None,
+        Ok(known) => known,
+    };
     Ok(picture)
 }
 
-/// Encodes in 4:4:4, with the metadata after the JFIF header.
+/// Encodes with colour as fine as in the source, and with the metadata after the JFIF header.
 pub(super) fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>, String> {
-    let plain = compress(picture, quality, Subsamp::None, false)?;
+    let plain = compress(picture, quality, picture.colour, false)?;
     let body = Segments::new(&plain)
         .take_while(|segment| segment.marker == APP0)
         .last()

@@ -14,6 +14,8 @@ use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::Path;
 
+use turbojpeg::Subsamp;
+
 use crate::error::{Error, Fault, Place};
 
 pub use difference::perceptual_difference;
@@ -29,6 +31,8 @@ pub struct Picture {
     rgba: Vec<u8>,
     /// Segments of the source JPEG that belong to any copy of it: EXIF, XMP, colour profile.
     metadata: Vec<Vec<u8>>,
+    /// How coarsely the source JPEG had its colour, so that a copy has it as finely.
+    colour: Subsamp,
 }
 
 /// The kinds of files that pictures are read from.
@@ -161,8 +165,8 @@ impl Picture {
 
     /// Writes a JPEG (`.jpg`, `.jpeg`) of quality 1 to 100, or a PNG (`.png`).
     ///
-    /// JPEG keeps its colour at full resolution (4:4:4), because halving it frays thin coloured
-    /// lines, and carries the EXIF, XMP and ICC segments of the JPEG it was read from. The file is
+    /// A JPEG has its colour at the resolution of the JPEG it was read from, at full resolution (4:4:4) where
+    /// there was none or that was grey, and carries its EXIF, XMP and ICC segments. The file is
     /// written under a temporary name beside `path` and renamed, so it is there whole or not at
     /// all. The same picture gives the same bytes.
     ///
@@ -246,6 +250,7 @@ impl Picture {
             height,
             rgba,
             metadata: Vec::new(),
+            colour: Subsamp::None,
         }
     }
 }
