@@ -4,7 +4,7 @@ use super::Counts;
 use super::canvas::Canvas;
 use super::curve::{Curve, rounded};
 use super::grid::Grid;
-use super::marks::{draw_object, ticks};
+use super::marks::{draw_rings, ticks};
 use super::style::{Frame, Style};
 use super::text::{CAP_HEIGHT, Face, Typesetter};
 use crate::frame::Pixel;
@@ -226,12 +226,11 @@ fn draw_sample(canvas: &mut Canvas, style: &Style, sample: Sample, at: Pixel) {
     };
     match sample {
         Sample::Ring { detected } => {
-            let circle = Curve::circle(at, 6.2 * unit).points();
-            draw_object(canvas, style, detected, &[&circle], &style.ring(detected));
+            let circle = Curve::circle(at, 6.2 * unit);
+            draw_rings(canvas, style, detected, &[circle]);
         }
         Sample::Ellipse => {
-            let mut ellipse = Curve::circle(at, 9.5 * unit);
-            ellipse.axes.row_mut(1).scale_mut(0.5);
+            let ellipse = Curve::upright(at, [9.5 * unit, 4.75 * unit]);
             canvas.closed(&[ellipse.points()], &style.ellipse(true));
         }
         Sample::Box => canvas.closed(&[block(7.0, 5.0)], &style.detection),

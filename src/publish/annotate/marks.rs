@@ -20,7 +20,7 @@ pub(super) struct Marks<'a> {
 pub(super) struct Ring<'a> {
     pub(super) object: &'a ObjectMark,
     pub(super) radius: f64,
-    circle: Vec<[f64; 2]>,
+    circle: Curve,
     ellipse: Option<Vec<[f64; 2]>>,
 }
 
@@ -87,7 +87,7 @@ impl<'a> Marks<'a> {
             if ring.radius < 40.0 * style.unit {
                 grid.take_disc(centre, ring.radius + 2.0 * style.unit);
             } else {
-                grid.take_points(&ring.circle);
+                grid.take_points(&ring.circle.points());
             }
             if let Some(ellipse) = &ring.ellipse {
                 grid.cross(ellipse);
@@ -105,14 +105,19 @@ impl<'a> Marks<'a> {
         let ticks: Vec<_> = self.points.iter().flat_map(|&p| ticks(p, style)).collect();
         canvas.open(&ticks, &style.detection);
         for detected in [false, true] {
-            let rings = || self.rings.iter().filter(|r| r.object.detected == detected);
-            let ellipses: Vec<_> = rings().filter_map(|r| r.ellipse.as_ref()).collect();
-            draw_object(canvas, style, detected, &ellipses, &style.ellipse(detected));
+            let rings = self.rings.iter().filter(|r| r.object.detected == detected);
+            let ellipses: Vec<_> = rings.filter_map(|r| r.ellipse.as_ref()).collect();
+            let line = style.ellipse(detected);
+            if detected {
+                canvas.closed(&ellipses, &line);
+            } else {
+                canvas.dashed(&ellipses, &line, style.dash);
+            }
         }
         for detected in [false, true] {
             let rings = self.rings.iter().filter(|r| r.object.detected == detected);
-            let circles: Vec<_> = rings.map(|ring| &ring.circle).collect();
-            draw_object(canvas, style, detected, &circles, &style.ring(detected));
+            let circles: Vec<_> = rings.map(|ring| ring.circle).collect();
+            draw_rings(canvas, style, detected, &circles);
         }
     }
 }
@@ -122,9 +127,11 @@ impl<'a> Ring<'a> {
         let radius = object.radius_px.max(style.min_ring_radius);
         let in_reach = radius <= style.max_half_axis && !object.radius_px.is_nan();
         let circle = Curve::circle(object.centre, radius);
-        let finite = object.centre.u.is_finite() && object.centre.v.is_finite();
-        let circle = (in_reach && finite).then(|| circle.points())?;
-        Frame::about(&circle).filter(|frame| frame.meets(&style.picture()))?;
+        let (u, v) = (object.centre.u, object.centre.v);
+        let about = Frame::about(&[[u - radius, v - radius], [u + radius, v + radius]])?;
+        if !(in_reach && about.meets(&style.picture())) {
+            return None;
+        }
         let ellipse = Curve::ellipse_95(object.centre, object.covariance_px)
             .filter(|e| (style.min_ellipse..=style.max_half_axis).contains(&e.reach))
             .map(|ellipse| ellipse.points());
@@ -137,19 +144,14 @@ impl<'a> Ring<'a> {
     }
 }
 
-/// Draws closed curves as those of objects, solid where this view detected them and dashed where it
-/// did not.
-pub(super) fn draw_object(
-    canvas: &mut Canvas,
-    style: &Style,
-    detected: bool,
-    curves: &[&Vec<[f64; 2]>],
-    line: &Line,
-) {
+/// Draws the rings of objects, solid where this view detected them and dashed where it did not.
+pub(super) fn draw_rings(canvas: &mut Canvas, style: &Style, detected: bool, circles: &[Curve]) {
+    let line = style.ring(detected);
     if detected {
-        canvas.closed(curves, line);
+        canvas.circles(circles, &line);
     } else {
-        canvas.dashed(curves, line, 13.0 * style.unit);
+        let points: Vec<_> = circles.iter().map(Curve::points).collect();
+        canvas.dashed(&points, &line, style.dash);
     }
 }
 

@@ -60,6 +60,8 @@ pub(super) struct Style {
     pub(super) text: Colour,
     pub(super) text_halo: Colour,
     pub(super) min_ring_radius: f64,
+    /// A dash and its gap, pixels.
+    pub(super) dash: f64,
     /// A 95 % ellipse whose long half-axis is shorter is left out.
     pub(super) min_ellipse: f64,
     /// A ring or ellipse whose long half-axis is longer is left out: a projection linearised so
@@ -91,6 +93,7 @@ impl Style {
             text: Colour::new(WHITE, 255),
             text_halo: Colour::new(NEAR_BLACK, 215),
             min_ring_radius: 7.0 * unit,
+            dash: 13.0 * unit,
             min_ellipse: (1.5 * unit).max(1.5),
             max_half_axis: 100.0 * width.hypot(height),
             label_size: (11.5 * unit).max(9.0),
