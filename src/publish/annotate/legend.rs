@@ -35,6 +35,7 @@ enum Sample {
     Ellipse,
     Box,
     Point,
+    Placed,
     Ground,
 }
 
@@ -178,6 +179,12 @@ fn rows(counts: &Counts, in_words: bool) -> Vec<Row> {
         points,
     );
     put(
+        counts.placed > 0,
+        Sample::Placed,
+        Some(counts.placed),
+        "detection*, placed on the ground",
+    );
+    put(
         counts.covered,
         Sample::Ground,
         None,
@@ -235,6 +242,7 @@ fn draw_sample(canvas: &mut Canvas, style: &Style, sample: Sample, at: Pixel) {
         }
         Sample::Box => canvas.closed(&[block(7.0, 5.0)], &style.detection),
         Sample::Point => canvas.open(&ticks(at, style), &style.detection),
+        Sample::Placed => canvas.circles(&[Curve::circle(at, 6.2 * unit)], &style.detection),
         Sample::Ground => {
             let ground = vec![block(9.5, 5.0)];
             canvas.fill(&ground, style.tint);

@@ -77,8 +77,8 @@ impl Stencil {
             let rows = rows.start.max(top)..rows.end.min(top + TILE);
             let (mut left, mut right) = (frame.left - reach, frame.right + reach);
             if let Some((slope, half)) = strip {
-                let [first, last] = [rows.start, rows.end - 1]
-                    .map(|row| from[0] + (float(row) - from[1]) * slope);
+                let [first, last] =
+                    [rows.start, rows.end - 1].map(|row| from[0] + (float(row) - from[1]) * slope);
                 left = left.max(first.min(last) - half);
                 right = right.min(first.max(last) + half);
             }

@@ -13,6 +13,9 @@ const APP0: u8 = 0xe0;
 const APP1: u8 = 0xe1;
 const APP2: u8 = 0xe2;
 
+/// What the content of an EXIF segment begins with.
+const EXIF: &[u8] = b"Exif\0\0";
+
 /// What libjpeg complains of in files that decode as they should.
 const HARMLESS: [&str; 4] = [
     "extraneous bytes before marker",
@@ -154,6 +157,17 @@ fn metadata(bytes: &[u8]) -> Vec<Vec<u8>> {
         })
         .map(|segment| bytes[segment.start..segment.end].to_vec())
         .collect()
+}
+
+/// EXIF, without its name, as a segment of a JPEG, if it fits into one.
+pub(super) fn exif_segment(exif: &[u8]) -> Option<Vec<u8>> {
+    let length = u16::try_from(2 + EXIF.len() + exif.len()).ok()?;
+    Some([&[0xff, APP1], length.to_be_bytes().as_slice(), EXIF, exif].concat())
+}
+
+/// The EXIF that a segment holds, without its name.
+pub(super) fn exif_of(segment: &[u8]) -> Option<&[u8]> {
+    segment.get(4..)?.strip_prefix(EXIF)
 }
 
 /// One marker segment: from its 0xff to the end of its content.
