@@ -154,9 +154,7 @@ impl<'a> Map<'a> {
         let rows = handled.iter_mut().filter_map(|h| h.annotated.take());
         let rows: Vec<Row> = rows.collect();
         if !rows.is_empty() {
-            let index = annotated::index(&rows)?;
-            folder.write(&index)?;
-            files.push(index.name);
+            folder.write(&annotated::index(&rows)?)?;
         }
         let carried = match n_carried {
             0 => String::new(),

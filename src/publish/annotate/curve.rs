@@ -61,7 +61,7 @@ impl Curve {
     /// The curve as a closed polygon that starts at the top (of a circle).
     pub(super) fn points(&self) -> Vec<[f64; 2]> {
         let step = (1.0 - CHORD_TOLERANCE / self.reach.max(0.5)).acos();
-        let count = (PI / step).ceil().clamp(16.0, 4096.0);
+        let count = (PI / step).ceil().clamp(20.0, 4096.0);
         let mut points = Vec::new();
         let mut index = 0.0;
         while index < count {

@@ -278,4 +278,38 @@ mod tests {
         stencil.clear();
         assert!(stencil.tiles().is_empty() && stencil.numbers.iter().all(|&n| n == 0));
     }
+
+    #[test]
+    fn distances_to_circles_are_those_of_the_formula() {
+        for (centre, radius) in [
+            ([20.3, 17.6], 12.25),
+            ([25.0, 20.0], 2.0),
+            ([-300.0, 20.0], 320.5),
+        ] {
+            let mut stencil = Stencil::new(50, 40);
+            stencil.circle(centre, radius, 3.5);
+            let mut squares = vec![f32::INFINITY; 50 * 40];
+            for tile in stencil.tiles() {
+                for (index, &square) in tile.squares.iter().enumerate() {
+                    let (x, y) = (tile.column + index % TILE, tile.row + index / TILE);
+                    if x < 50 && y < 40 {
+                        squares[y * 50 + x] = square;
+                    }
+                }
+            }
+            let mut near = 0;
+            for (index, &square) in squares.iter().enumerate() {
+                let (x, y) = (float(index % 50), float(index / 50));
+                let expected = ((x - centre[0]).hypot(y - centre[1]) - radius).abs();
+                if expected < 3.5 {
+                    near += 1;
+                    assert!(
+                        (f64::from(square).sqrt() - expected).abs() < 1e-3,
+                        "{x} {y}"
+                    );
+                }
+            }
+            assert!(near > 50, "{near}");
+        }
+    }
 }

@@ -29,7 +29,6 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     let (width, height) = size(&mut Cursor::new(bytes))?;
     let mut rgba = vec![0; pixel_count(width, height)? * 4];
     let mut decompressor = Decompressor::new().map_err(|e| problem(&e))?;
-    let header = decompressor.read_header(bytes);
     let decoded = decompressor.decompress(
         bytes,
         Image {
@@ -46,7 +45,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     }
     let mut picture = Picture::from_parts(width, height, rgba);
     picture.metadata = metadata(bytes);
-    picture.colour = match header.map(|header| header.subsamp) {
+    picture.colour = match decompressor.read_header(bytes).map(|header| header.subsamp) {
         // What is drawn on a grey picture is in colour.
         Ok(Subsamp::Gray) | Err(_) => Subsamp::None,
         Ok(known) => known,
