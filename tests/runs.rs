@@ -442,6 +442,87 @@ fn a_run_without_a_report_or_pictures() {
     assert!(pictures.iter().all(Value::is_null));
 }
 
+/// Runs a pipeline into a folder that may hold an earlier run.
+fn again(out: &Path, set: &[&str]) -> Summary {
+    let overrides = Overrides {
+        data: None,
+        out: Some(out.to_owned()),
+        set: set.iter().map(|&s| s.to_owned()).collect(),
+    };
+    let config = Config::read(&root().join("fixtures/tiny/pipeline.toml"), &overrides).unwrap();
+    pipeline::run(&config, true, &Silent).unwrap()
+}
+
+#[test]
+fn only_pictures_that_changed_are_drawn_again_and_the_bytes_are_those_of_a_fresh_run() {
+    let fresh = |set: &[&str]| Run::of("fixtures/tiny/pipeline.toml", None, set);
+    let run = fresh(&[]);
+    let bytes = run.bytes();
+    let n = run.summary.n_annotated;
+    assert!(n > 1 && run.summary.n_carried == 0);
+
+    assert_eq!(again(&run.out(), &[]).n_carried, n);
+    assert!(run.bytes() == bytes);
+
+    // A picture that is not any more what the run wrote, and one that is gone.
+    let index = fs::read_to_string(run.out().join("annotated/index.csv")).unwrap();
+    let file = |line: usize| index.lines().nth(line).unwrap().split(',').nth(2).unwrap();
+    fs::write(run.out().join("annotated").join(file(1)), "harmed").unwrap();
+    fs::remove_file(run.out().join("annotated").join(file(2))).unwrap();
+    assert_eq!(again(&run.out(), &[]).n_carried, n - 2);
+    assert!(run.bytes() == bytes);
+
+    // A list that cannot be read.
+    fs::write(run.out().join("annotated/index.csv"), "no list").unwrap();
+    assert_eq!(again(&run.out(), &[]).n_carried, 0);
+    assert!(run.bytes() == bytes);
+
+    // Other marks, another layout, another format, each beside a fresh run of the same.
+    for set in [
+        &["view.max_range_m=9.0"][..],
+        &["output.annotate_layout=\"single\""],
+        &["output.annotate_layout=\"side-by-side\""],
+        &["output.picture_quality=70"],
+        &["output.picture_format=\"png\""],
+    ] {
+        assert!(again(&run.out(), set).n_carried < n, "{set:?}");
+        assert!(run.bytes() == fresh(set).bytes(), "{set:?}");
+    }
+}
+
+#[test]
+fn layouts_formats_and_a_choice_of_pictures() {
+    let set = [
+        "output.annotate_layout=\"side-by-side\"",
+        "output.picture_format=\"tiff\"",
+    ];
+    let run = Run::of("fixtures/tiny/pipeline.toml", None, &set);
+    let data = report_data(&run);
+    let shown = data["views"]["picture"].as_array().unwrap();
+    assert_eq!(shown.len(), run.summary.n_annotated);
+    for name in shown {
+        let path = run.out().join(name.as_str().unwrap());
+        let size = rockmap::publish::Picture::size_of(&path, "picture").unwrap();
+        assert!(
+            path.extension().unwrap() == "tif" && size.0 > 640,
+            "{size:?}"
+        );
+    }
+
+    let index = fs::read_to_string(run.out().join("annotated/index.csv")).unwrap();
+    let image = index.lines().nth(2).unwrap().split(',').next().unwrap();
+    let only = format!("output.annotate_only=[\"{image}\", \"v99\"]");
+    let run = Run::of("fixtures/tiny/pipeline.toml", None, &[&only]);
+    assert_eq!(run.summary.n_annotated, 1);
+    assert_eq!(
+        run.summary.warnings,
+        ["output.annotate_only: found \"v99\", expected the image_id of a view"]
+    );
+    let shown = report_data(&run)["views"]["picture"].clone();
+    let shown = shown.as_array().unwrap().iter().filter(|p| !p.is_null());
+    assert_eq!(shown.count(), 1);
+}
+
 #[test]
 fn kite_photographs_of_ground_targets() {
     let Some(data) = real("copr-kite") else {

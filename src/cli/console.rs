@@ -137,6 +137,7 @@ fn json(summary: &Summary) -> Value {
         "n_placed": summary.folder.as_ref().map(|_| summary.n_placed),
         "n_objects": summary.n_objects,
         "n_annotated": summary.n_objects.map(|_| summary.n_annotated),
+        "n_carried": summary.n_objects.map(|_| summary.n_carried),
         "rejected": summary.rejected(),
         "rejects": rejects.collect::<Vec<_>>(),
         "warnings": summary.warnings,
@@ -167,6 +168,9 @@ fn table(summary: &Summary) -> String {
     if let Some(n_objects) = summary.n_objects {
         row("objects", n_objects.to_string());
         row("pictures annotated", summary.n_annotated.to_string());
+        if summary.n_carried > 0 {
+            row("  carried over", summary.n_carried.to_string());
+        }
     }
     for stage in &summary.stages {
         row(

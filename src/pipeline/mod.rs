@@ -2,6 +2,7 @@
 //!
 //! The top functions read as the walk of a night's data: [`run`], [`project`] and [`check`].
 
+mod annotated;
 mod bound;
 mod checks;
 mod config;

@@ -73,6 +73,9 @@ impl Inputs {
                         self.pictures.count += 1;
                         self.pictures.bytes += bytes;
                         all.update(digest);
+                        if let Some(picture) = &mut view.picture {
+                            picture.sha256 = Some(digest.into());
+                        }
                     }
                 }
             }

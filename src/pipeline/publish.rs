@@ -1,12 +1,15 @@
 //! The stage that publishes.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use rayon::prelude::*;
+use sha2::{Digest, Sha256};
 
 use super::Observer;
+use super::annotated::{self, Earlier, Row, slashed};
 use super::config::Config;
+use super::digest::hexadecimal;
 use super::manifest::{pretty, run_json, timing_json};
 use super::read::Inputs;
 use super::stages::{Clock, Ground};
@@ -17,7 +20,8 @@ use crate::input::Reject;
 use crate::publish::mosaic::encode;
 use crate::publish::report::{self, CropPlan, CutCrop};
 use crate::publish::{
-    Folder, Format, Layer, Picture, Product, Rock, Scene, annotate, qgis, reject_table, stac, table,
+    Annotation, Folder, Format, Layer, Picture, Product, Rock, Scene, annotate_panels, picture,
+    qgis, reject_table, stac, table,
 };
 use crate::view::View;
 
@@ -48,6 +52,8 @@ pub(super) struct Map<'a> {
     scene: Scene<'a>,
     rocks: Vec<Rock>,
     crops: CropPlan,
+    /// What the annotated picture of each view is called, below their folder.
+    names: Vec<Option<PathBuf>>,
     run_id: String,
 }
 
@@ -56,6 +62,7 @@ pub(super) struct Map<'a> {
 pub(super) struct Written {
     files: Vec<String>,
     n_annotated: usize,
+    n_carried: usize,
     /// Pieces of pictures for the report.
     crops: Vec<CutCrop>,
     warnings: Vec<String>,
@@ -64,8 +71,18 @@ pub(super) struct Written {
 /// What was made of a picture.
 #[derive(Default)]
 struct Handled {
-    is_annotated: bool,
+    annotated: Option<Row>,
+    is_carried: bool,
     crops: Vec<CutCrop>,
+}
+
+/// A picture to be drawn.
+struct Plan {
+    panels: Vec<Annotation>,
+    format: picture::Format,
+    path: PathBuf,
+    /// What the list will say of it, but for its content.
+    row: Row,
 }
 
 impl<'a> Map<'a> {
@@ -80,6 +97,11 @@ impl<'a> Map<'a> {
         let mut map = Self::single_view(config, inputs, ground, run_id);
         map.rocks = map.scene.rock_map(fusion);
         map.fusion = Some(fusion);
+        if config.output.annotate {
+            let originals = inputs.views.iter().map(|view| map.original(view));
+            let originals: Vec<_> = originals.collect();
+            map.names = annotated::names(&originals, config.output.picture_format);
+        }
         if config.output.report {
             map.crops = CropPlan::new(&map.scene, &map.rocks);
         }
@@ -101,6 +123,7 @@ impl<'a> Map<'a> {
             scene: ground.scene(config, inputs),
             rocks: Vec::new(),
             crops: CropPlan::empty(),
+            names: vec![None; inputs.views.len()],
             run_id,
         }
     }
@@ -115,25 +138,48 @@ impl<'a> Map<'a> {
             folder.write(&product)?;
             files.push(product.name);
         }
-        let warnings = Mutex::new(warnings);
-        let handled: Vec<Handled> = pictures
+        let warnings = Mutex::new([warnings, self.unknown_images()].concat());
+        let earlier = Earlier::of(folder.target());
+        let mut handled: Vec<Handled> = pictures
             .par_iter()
             .map(|&(view, picture)| {
-                let handled = self.handle(folder, view, picture, &warnings);
+                let handled = self.handle((folder, &earlier), view, picture, &warnings);
                 observer.step();
                 handled
             })
             .collect::<Result<_, Error>>()?;
         let mut warnings: Vec<String> = warnings.into_inner().unwrap_or_default();
         warnings.sort();
-        let n_annotated = handled.iter().filter(|h| h.is_annotated).count();
-        observer.end(&format!("{n_annotated} pictures annotated"));
+        let n_carried = handled.iter().filter(|h| h.is_carried).count();
+        let rows = handled.iter_mut().filter_map(|h| h.annotated.take());
+        let rows: Vec<Row> = rows.collect();
+        if !rows.is_empty() {
+            folder.write(&annotated::index(&rows)?)?;
+        }
+        let carried = match n_carried {
+            0 => String::new(),
+            n => format!(", {n} of them carried over"),
+        };
+        observer.end(&format!("{} pictures annotated{carried}", rows.len()));
         Ok(Written {
             files,
-            n_annotated,
+            n_annotated: rows.len(),
+            n_carried,
             crops: handled.into_iter().flat_map(|h| h.crops).collect(),
             warnings,
         })
+    }
+
+    /// A warning for each image that is to be annotated and is none of the run's.
+    fn unknown_images(&self) -> Vec<String> {
+        let is_known = |id: &&String| self.inputs.views.iter().any(|v| v.image_id == **id);
+        let only = self.config.output.annotate_only.iter();
+        let unknown = only.filter(|id| !is_known(id));
+        unknown
+            .map(|id| {
+                format!("output.annotate_only: found {id:?}, expected the image_id of a view")
+            })
+            .collect()
     }
 
     /// The pictures laid on the ground, where that is asked for, and what was odd about it.
@@ -224,21 +270,23 @@ impl<'a> Map<'a> {
     fn pictures(&self) -> Vec<(usize, &View)> {
         let views = self.inputs.views.iter().enumerate();
         views
-            .filter(|&(index, view)| self.is_annotated(view) || self.crops.needs(index))
+            .filter(|&(index, _)| self.names[index].is_some() || self.crops.needs(index))
             .collect()
     }
 
-    /// Whether the picture of a view is to be drawn.
-    fn is_annotated(&self, view: &View) -> bool {
-        let wanted = self.fusion.is_some() && self.config.output.annotate;
-        wanted && view.picture.is_some() && view.camera.is_some()
+    /// The name of a view's picture, if it is to be annotated.
+    fn original(&self, view: &'a View) -> Option<&'a str> {
+        let only = &self.config.output.annotate_only;
+        let is_wanted = only.is_empty() || only.contains(&view.image_id);
+        let picture = view.picture.as_ref().filter(|_| view.camera.is_some())?;
+        is_wanted.then_some(picture.name.as_str())
     }
 
-    /// Cuts what the report needs from one picture, and draws it; one that cannot be decoded costs
-    /// a warning.
+    /// Cuts what the report needs from one picture, and annotates it; one that cannot be decoded
+    /// costs a warning.
     fn handle(
         &self,
-        folder: &Folder,
+        (folder, earlier): (&Folder, &Earlier),
         index: usize,
         view: &View,
         warnings: &Mutex<Vec<String>>,
@@ -246,25 +294,75 @@ impl<'a> Map<'a> {
         let Some(source) = &view.picture else {
             return Ok(Handled::default());
         };
-        let mut picture = match Picture::read(&source.path, &source.name) {
+        let plan = self.plan(folder, index, view)?;
+        let mut handled = Handled::default();
+        if let Some(plan) = &plan
+            && let Some(sha256) = earlier.carry(&plan.row.file, &plan.row.key, &plan.path)
+        {
+            handled.is_carried = true;
+            handled.annotated = Some(Row {
+                sha256,
+                ..plan.row.clone()
+            });
+            if !self.crops.needs(index) {
+                return Ok(handled);
+            }
+        }
+        let picture = match Picture::read(&source.path, &source.name) {
             Ok(picture) => picture,
             Err(error) => {
                 if let Ok(mut warnings) = warnings.lock() {
                     warnings.push(format!("image {}: {error}", view.image_id));
                 }
-                return Ok(Handled::default());
+                return Ok(handled);
             }
         };
-        let crops = self.crops.cut(index, &picture);
-        let is_annotated = self.is_annotated(view);
-        if is_annotated {
-            annotate(&mut picture, &self.scene.annotation_of(index, &self.rocks));
-            let path = folder.path_of(&Path::new("annotated").join(drawn_name(&source.name)))?;
-            picture.write(&path, Picture::JPEG_QUALITY)?;
+        handled.crops = self.crops.cut(index, &picture);
+        if let Some(plan) = plan.filter(|_| !handled.is_carried) {
+            handled.annotated = Some(self.draw(plan, picture)?);
         }
-        Ok(Handled {
-            is_annotated,
-            crops,
+        Ok(handled)
+    }
+
+    /// What is to be drawn of a view, if anything is.
+    fn plan(&self, folder: &Folder, index: usize, view: &View) -> Result<Option<Plan>, Error> {
+        let (Some(name), Some(source)) = (&self.names[index], &view.picture) else {
+            return Ok(None);
+        };
+        let output = &self.config.output;
+        let panels = self
+            .scene
+            .panels_of(index, &self.rocks, output.annotate_layout);
+        let format = picture::Format::by_name(name).unwrap_or(picture::Format::Png);
+        // A picture whose content is not known is like no earlier one.
+        let key = source
+            .sha256
+            .map(|content| annotated::key(content, &panels, format, output));
+        Ok(Some(Plan {
+            panels,
+            format,
+            path: folder.path_of(&Path::new(annotated::FOLDER).join(name))?,
+            row: Row {
+                image_id: view.image_id.clone(),
+                picture: source.name.clone(),
+                file: slashed(name),
+                key: key.unwrap_or_default(),
+                sha256: String::new(),
+            },
+        }))
+    }
+
+    /// Draws a picture and writes it.
+    fn draw(&self, plan: Plan, picture: Picture) -> Result<Row, Error> {
+        let words =
+            |why: &dyn std::fmt::Display| Error::Output(format!("{}: {why}", plan.path.display()));
+        let drawn = annotate_panels(picture, &plan.panels).map_err(|e| words(&e))?;
+        let quality = self.config.output.picture_quality;
+        let content = drawn.encode(plan.format, quality).map_err(|e| words(&e))?;
+        std::fs::write(&plan.path, &content).map_err(|e| Error::io(&plan.path, "write", e))?;
+        Ok(Row {
+            sha256: hexadecimal(&Sha256::digest(&content)),
+            ..plan.row
         })
     }
 
@@ -275,19 +373,11 @@ impl<'a> Map<'a> {
         rejects: &[Reject],
         crops: &[CutCrop],
     ) -> Product {
-        let annotated = |view: &View| {
-            let source = view.picture.as_ref().filter(|_| self.is_annotated(view))?;
-            let path = drawn_name(&source.name);
-            let parts = path.iter().map(|part| part.to_string_lossy());
-            Some(
-                ["annotated".into()]
-                    .into_iter()
-                    .chain(parts)
-                    .collect::<Vec<_>>()
-                    .join("/"),
-            )
+        let annotated = |name: &Option<PathBuf>| {
+            let name = name.as_ref()?;
+            Some(slashed(&Path::new(annotated::FOLDER).join(name)))
         };
-        let pictures: Vec<Option<String>> = self.inputs.views.iter().map(annotated).collect();
+        let pictures: Vec<Option<String>> = self.names.iter().map(annotated).collect();
         let run = report::Run {
             title: &self.config.site.name,
             manifest,
@@ -315,6 +405,7 @@ impl<'a> Map<'a> {
         summary.n_placed = self.ground.placed.len();
         summary.n_objects = self.fusion.map(|_| self.rocks.len());
         summary.n_annotated = written.n_annotated;
+        summary.n_carried = written.n_carried;
         summary.warnings.extend(written.warnings);
         folder.write(&reject_table(&summary.rejects)?)?;
         let mut outputs = written.files;
@@ -341,25 +432,4 @@ impl<'a> Map<'a> {
         summary.folder = Some(folder.publish()?);
         Ok(summary)
     }
-}
-
-/// What an annotated picture is called: as its original, but for TIFF, which becomes PNG.
-fn drawn_name(name: &str) -> PathBuf {
-    let path = tame(name);
-    let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    match extension.as_ref().and_then(|e| e.to_str()) {
-        Some("jpg" | "jpeg" | "png") => path,
-        _ => path.with_extension("png"),
-    }
-}
-
-/// A picture's name as a path that stays below the folder it is written to.
-fn tame(name: &str) -> PathBuf {
-    let parts = Path::new(name).components();
-    parts
-        .filter_map(|part| match part {
-            Component::Normal(part) => Some(part),
-            _ => None,
-        })
-        .collect()
 }

@@ -24,8 +24,10 @@ pub struct Summary {
     pub n_placed: usize,
     /// Objects of the map; `None` where nothing was fused.
     pub n_objects: Option<usize>,
-    /// Pictures drawn.
+    /// Pictures annotated.
     pub n_annotated: usize,
+    /// Those of them that an earlier run had drawn alike.
+    pub n_carried: usize,
     /// Records set aside.
     pub rejects: Vec<Reject>,
     /// What was odd and did no harm.
@@ -83,6 +85,7 @@ impl Summary {
             n_placed: 0,
             n_objects: None,
             n_annotated: 0,
+            n_carried: 0,
             rejects,
             warnings: inputs.warnings.clone(),
             stages: Vec::new(),

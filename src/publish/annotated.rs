@@ -1,12 +1,17 @@
 //! The pictures with the fused rocks drawn back into them.
 
+use std::iter::once;
+
 use geo::{Coord, Densify, Euclidean, LineString};
 
+use serde::Serialize;
+
 use super::Scene;
-use super::annotate::{Annotation, DetectionMark, ObjectMark};
+use super::annotate::{Annotation, DetectionMark, ObjectMark, PlacedMark};
 use super::rock::{Rock, project_covariance};
 use crate::detection::Mark;
-use crate::frame::{Pixel, Point};
+use crate::frame::{Enu, Pixel, Point};
+use crate::project::Placed;
 use crate::view::View;
 
 /// Outlines of covered ground are followed in steps of at most this, metres, so that straight edges
@@ -15,8 +20,60 @@ const STEP_M: f64 = 0.25;
 /// The radius a rock of unknown size is drawn with, metres.
 const UNKNOWN_RADIUS_M: f64 = 0.1;
 
+/// What the annotated pictures show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// The rocks of all views, beside the view's own detections, as in Figure 12 of Thompson and
+    /// Wettergreen (2005).
+    #[default]
+    Fused,
+    /// What the view alone detected, as in their Figure 11.
+    Single,
+    /// The one at the left, the other at the right.
+    SideBySide,
+}
+
+impl Layout {
+    /// All layouts there are.
+    pub const ALL: [Self; 3] = [Self::Fused, Self::Single, Self::SideBySide];
+
+    /// Its name in pipeline files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fused => "fused",
+            Self::Single => "single",
+            Self::SideBySide => "side-by-side",
+        }
+    }
+}
+
 impl Scene<'_> {
-    /// What is drawn into the picture of a view.
+    /// What is drawn into the picture of a view, by panel.
+    pub(super) fn panels(
+        &self,
+        view_index: usize,
+        rocks: &[Rock],
+        layout: Layout,
+    ) -> Vec<Annotation> {
+        let fused = self.annotation(view_index, rocks);
+        let titled = |annotation: Annotation, what: &str| Annotation {
+            title: format!("{} \u{b7} {what}", annotation.title),
+            ..annotation
+        };
+        let single = |fused: &Annotation| Annotation {
+            placed: self.placed_marks(view_index),
+            objects: Vec::new(),
+            ..titled(fused.clone(), "this view alone")
+        };
+        match layout {
+            Layout::Fused => vec![fused],
+            Layout::Single => vec![single(&fused)],
+            Layout::SideBySide => vec![single(&fused), titled(fused, "all views fused")],
+        }
+    }
+
+    /// What is drawn of the fused map.
     pub(super) fn annotation(&self, view_index: usize, rocks: &[Rock]) -> Annotation {
         let view = &self.views[view_index];
         let title = match view.camera_name() {
@@ -27,6 +84,7 @@ impl Scene<'_> {
             title,
             covered: self.covered(view_index),
             detections: self.detection_marks(view_index),
+            placed: Vec::new(),
             objects: self.object_marks(view_index, rocks),
         }
     }
@@ -37,7 +95,7 @@ impl Scene<'_> {
         let area = self.footprints.covered_by_others(view_index);
         let mut rings = Vec::new();
         for polygon in &area {
-            for ring in std::iter::once(polygon.exterior()).chain(polygon.interiors()) {
+            for ring in once(polygon.exterior()).chain(polygon.interiors()) {
                 rings.extend(self.ring_in_picture(view, ring));
             }
         }
@@ -76,6 +134,25 @@ impl Scene<'_> {
         .collect()
     }
 
+    /// The view's detections that have a place on the ground: about their own aim points, or where
+    /// the place projects if they are no marks in the picture.
+    fn placed_marks(&self, view_index: usize) -> Vec<PlacedMark> {
+        let view = &self.views[view_index];
+        let mark = |placed: &Placed| {
+            let (at, _) = project_covariance(view, placed.hit.point, &placed.covariance)?;
+            let centre = placed.detection.aim_point(self.aim).unwrap_or(at);
+            let radius_px = match placed.detection.mark {
+                Mark::Box(b) => 0.5 * b.width(),
+                _ => placed.diameter_m.map_or(0.0, |diameter_m| {
+                    radius_px(view, 0.5 * diameter_m, placed.hit.point, centre).unwrap_or(0.0)
+                }),
+            };
+            Some(PlacedMark { centre, radius_px })
+        };
+        let here = self.placed.iter().filter(|p| p.view == view_index);
+        here.filter_map(mark).collect()
+    }
+
     fn object_marks(&self, view_index: usize, rocks: &[Rock]) -> Vec<ObjectMark> {
         let view = &self.views[view_index];
         let concerns = |rock: &&Rock| {
@@ -101,8 +178,12 @@ impl Scene<'_> {
 /// How large a rock appears in a view that has it at `centre`, pixels; `None` where the lens does
 /// not see it.
 pub(super) fn apparent_radius_px(view: &View, rock: &Rock, centre: Pixel) -> Option<f64> {
-    let distance_m = view.origin().distance(rock.object.place);
     let radius_m = rock.diameter_m.map_or(UNKNOWN_RADIUS_M, |d| 0.5 * d);
+    radius_px(view, radius_m, rock.object.place, centre)
+}
+
+fn radius_px(view: &View, radius_m: f64, place: Point<Enu>, centre: Pixel) -> Option<f64> {
+    let distance_m = view.origin().distance(place);
     let (_, by_pixel) = view.camera.as_ref()?.ray_with_jacobian(centre).ok()?;
     Some(radius_m / (distance_m * by_pixel.direction.column(0).norm()))
 }

@@ -27,7 +27,8 @@ pub mod stac;
 pub(crate) mod svg;
 mod wkt;
 
-pub use annotate::{Annotation, annotate};
+pub use annotate::{Annotation, annotate, annotate_panels};
+pub use annotated::Layout;
 pub use folder::Folder;
 pub use format::Format;
 pub use layer::Layer;
@@ -104,6 +105,11 @@ impl Scene<'_> {
         }
         let rock_of = |i: usize| owner[i].map(|(_, r)| rocks[r].rock_id.clone());
         self.detections(&rock_of)
+    }
+
+    /// What is drawn into the picture of a view, one annotation a panel.
+    pub fn panels_of(&self, view: usize, rocks: &[Rock], layout: Layout) -> Vec<Annotation> {
+        self.panels(view, rocks, layout)
     }
 
     /// What is drawn into the picture of a view.

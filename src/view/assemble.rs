@@ -314,6 +314,7 @@ fn view(sources: &Sources<'_>, posed: &Posed<'_>) -> Result<View, (Reason, Strin
     let picture = image.path.as_ref().map(|name| Picture {
         name: name.clone(),
         path: posed.file.parent().unwrap_or(Path::new("")).join(name),
+        sha256: None,
     });
     let place = sources.site.geodetic(posed.pose.enu_from_body.origin());
     let [pan, tilt] = image.pan_tilt;

@@ -44,6 +44,8 @@ pub struct Picture {
     pub name: String,
     /// Where to open it.
     pub path: PathBuf,
+    /// SHA-256 of its content, where the run hashed it.
+    pub sha256: Option<[u8; 32]>,
 }
 
 impl View {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::super::formats::formats;
 use super::{Overrides, POSITIVE};
 use crate::input::Section;
-use crate::publish::Format;
+use crate::publish::{Format, Layout, Picture, picture};
 
 /// `[output]`: what is written, and where.
 #[derive(Debug, Clone, Serialize)]
@@ -21,6 +21,18 @@ pub struct OutputConfig {
     pub formats: Vec<Format>,
     /// Whether pictures are annotated.
     pub annotate: bool,
+    /// What the annotated pictures show.
+    #[serde(skip_serializing_if = "is_default")]
+    pub annotate_layout: Layout,
+    /// The images that are annotated; all where the list is empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub annotate_only: Vec<String>,
+    /// The format of annotated pictures; that of their originals if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub picture_format: Option<picture::Format>,
+    /// The quality of annotated JPEG pictures.
+    #[serde(skip_serializing_if = "is_default_quality")]
+    pub picture_quality: u8,
     /// Whether report.html is written.
     pub report: bool,
     /// Whether every detection is written by itself too.
@@ -50,6 +62,13 @@ pub(super) fn output(
         dir: overrides.out.clone().unwrap_or(dir),
         formats: formats.clone().unwrap_or_default(),
         annotate: section.boolean("annotate").unwrap_or(true),
+        annotate_layout: layout(&section),
+        annotate_only: section.texts("annotate_only").unwrap_or_default(),
+        picture_format: picture_format(&section),
+        picture_quality: section
+            .integer("picture_quality", 1..=100)
+            .and_then(|quality| u8::try_from(quality).ok())
+            .unwrap_or(Picture::JPEG_QUALITY),
         report: section.boolean("report").unwrap_or(true),
         detections: section.boolean("detections").unwrap_or(false),
         mosaic: section.boolean("mosaic").unwrap_or(false),
@@ -57,4 +76,30 @@ pub(super) fn output(
     };
     section.finish();
     formats.map(|_| config)
+}
+
+fn layout(section: &Section<'_>) -> Layout {
+    let words = Layout::ALL.map(Layout::name);
+    let word = section.word("annotate_layout", &words);
+    let named = |layout: &Layout| word.as_deref() == Some(layout.name());
+    Layout::ALL.into_iter().find(named).unwrap_or_default()
+}
+
+fn picture_format(section: &Section<'_>) -> Option<picture::Format> {
+    let words = ["same", "jpeg", "png", "tiff"];
+    match section.word("picture_format", &words).as_deref() {
+        Some("jpeg") => Some(picture::Format::Jpeg),
+        Some("png") => Some(picture::Format::Png),
+        Some("tiff") => Some(picture::Format::Tiff),
+        _ => None,
+    }
+}
+
+fn is_default(layout: &Layout) -> bool {
+    *layout == Layout::default()
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_default_quality(quality: &u8) -> bool {
+    *quality == Picture::JPEG_QUALITY
 }

@@ -1,6 +1,6 @@
 //! Drawing in place on a picture.
 
-use super::curve;
+use super::curve::{self, Curve};
 use super::fill;
 use super::grid::whole;
 use super::stencil::{Stencil, TILE, Tile};
@@ -9,6 +9,9 @@ use crate::publish::picture::Picture;
 
 /// How blunt the ends of dashes are: rounder ones would close the gaps between short dashes.
 const BLUNTNESS: f64 = 3.0;
+
+/// The largest radius that a circle is drawn with as one: of larger ones the renderer's precision would show.
+const MAX_CIRCLE_RADIUS: f64 = 4096.0;
 
 /// A picture to draw on.
 pub(super) struct Canvas<'a> {
@@ -51,10 +54,19 @@ impl<'a> Canvas<'a> {
     /// Draws closed polygons in one line, dark below bright.
     pub(super) fn closed<P: AsRef<[[f64; 2]]>>(&mut self, polygons: &[P], line: &Line) {
         for polygon in polygons {
-            let points = polygon.as_ref();
-            for (index, &start) in points.iter().enumerate() {
-                let end = points[(index + 1) % points.len()];
-                self.stencil.segment([start, end], line.reach(), 1.0);
+            self.stencil.polygon(polygon.as_ref(), line.reach());
+        }
+        self.ink(line);
+    }
+
+    /// Draws whole circles as [`Canvas::closed`].
+    pub(super) fn circles(&mut self, circles: &[Curve], line: &Line) {
+        for circle in circles {
+            let centre = [circle.centre.u, circle.centre.v];
+            if circle.reach <= MAX_CIRCLE_RADIUS {
+                self.stencil.circle(centre, circle.reach, line.reach());
+            } else {
+                self.stencil.polygon(&circle.points(), line.reach());
             }
         }
         self.ink(line);
@@ -196,7 +208,7 @@ impl Pen {
             (line.core_width / 2.0 + 0.5, line.core),
         ];
         let mixes = (0..Self::STEPS).map(|step| {
-            let distance = (f64::from(step) + 0.5) / f64::from(Self::STEPS) * reach;
+            let distance = f64::from(step) / f64::from(Self::STEPS) * reach;
             let (mut keep, mut add) = (1.0, [0.0; 3]);
             for (edge, colour) in layers {
                 let alpha = (edge - distance).clamp(0.0, 1.0) * f64::from(colour.alpha) / 255.0;
@@ -228,18 +240,28 @@ impl Pen {
         if !near {
             return;
         }
-        for (pixel, &square) in pixels.chunks_exact_mut(4).zip(squares) {
-            if square >= self.reach_square {
-                continue;
-            }
-            let entry = whole(f64::from(square.sqrt() * self.scale));
-            let Some(mix) = self.mixes.get(entry) else {
-                continue;
+        // The square roots without a branch, many at once; beyond the reach lies no entry.
+        let mut entries = [0; TILE];
+        for (entry, &square) in entries.iter_mut().zip(squares) {
+            let square = if square < self.reach_square {
+                square
+            } else {
+                self.reach_square
             };
-            mix.apply(pixel);
+            // Wrapping, because a check for an overflow that cannot be would forbid to do many at once.
+            let rounded = (square.sqrt() * self.scale + WHOLE).to_bits();
+            *entry = rounded.wrapping_sub(WHOLE.to_bits());
+        }
+        for (pixel, entry) in pixels.chunks_exact_mut(4).zip(entries) {
+            if let Some(mix) = self.mixes.get(entry as usize) {
+                mix.apply(pixel);
+            }
         }
     }
 }
+
+/// What a small number is added to to be rounded: the last bits of the sum are the nearest whole one.
+const WHOLE: f32 = 8_388_608.0;
 
 /// The renderer's precision.
 #[expect(

@@ -8,7 +8,7 @@ use super::style::Frame;
 use crate::frame::{Ellipse, Pixel};
 
 /// How far a chord may lie from its curve, pixels.
-const CHORD_TOLERANCE: f64 = 0.1;
+const CHORD_TOLERANCE: f64 = 0.15;
 /// Of one dash and its gap, what the dash takes with its ends.
 const DASH_SHARE: f64 = 0.66;
 /// The fewest dashes of a closed curve.
@@ -33,6 +33,15 @@ impl Curve {
         }
     }
 
+    /// An upright ellipse by its half-axes, pixels.
+    pub(super) fn upright(centre: Pixel, [across, down]: [f64; 2]) -> Self {
+        Self {
+            centre,
+            axes: Matrix2::new(across, 0.0, 0.0, down),
+            reach: across.max(down),
+        }
+    }
+
     /// The 95 % ellipse of a covariance, px^2; a variance under zero counts as zero.
     pub(super) fn ellipse_95(centre: Pixel, covariance: Matrix2<f64>) -> Option<Self> {
         if !covariance.iter().all(|value| value.is_finite()) {
@@ -52,7 +61,7 @@ impl Curve {
     /// The curve as a closed polygon that starts at the top (of a circle).
     pub(super) fn points(&self) -> Vec<[f64; 2]> {
         let step = (1.0 - CHORD_TOLERANCE / self.reach.max(0.5)).acos();
-        let count = (PI / step).ceil().clamp(24.0, 4096.0);
+        let count = (PI / step).ceil().clamp(20.0, 4096.0);
         let mut points = Vec::new();
         let mut index = 0.0;
         while index < count {

@@ -4,7 +4,7 @@ use super::Counts;
 use super::canvas::Canvas;
 use super::curve::{Curve, rounded};
 use super::grid::Grid;
-use super::marks::{draw_object, ticks};
+use super::marks::{draw_rings, ticks};
 use super::style::{Frame, Style};
 use super::text::{CAP_HEIGHT, Face, Typesetter};
 use crate::frame::Pixel;
@@ -35,6 +35,7 @@ enum Sample {
     Ellipse,
     Box,
     Point,
+    Placed,
     Ground,
 }
 
@@ -178,6 +179,12 @@ fn rows(counts: &Counts, in_words: bool) -> Vec<Row> {
         points,
     );
     put(
+        counts.placed > 0,
+        Sample::Placed,
+        Some(counts.placed),
+        "detection*, placed on the ground",
+    );
+    put(
         counts.covered,
         Sample::Ground,
         None,
@@ -226,16 +233,16 @@ fn draw_sample(canvas: &mut Canvas, style: &Style, sample: Sample, at: Pixel) {
     };
     match sample {
         Sample::Ring { detected } => {
-            let circle = Curve::circle(at, 6.2 * unit).points();
-            draw_object(canvas, style, detected, &[&circle], &style.ring(detected));
+            let circle = Curve::circle(at, 6.2 * unit);
+            draw_rings(canvas, style, detected, &[circle]);
         }
         Sample::Ellipse => {
-            let mut ellipse = Curve::circle(at, 9.5 * unit);
-            ellipse.axes.row_mut(1).scale_mut(0.5);
+            let ellipse = Curve::upright(at, [9.5 * unit, 4.75 * unit]);
             canvas.closed(&[ellipse.points()], &style.ellipse(true));
         }
         Sample::Box => canvas.closed(&[block(7.0, 5.0)], &style.detection),
         Sample::Point => canvas.open(&ticks(at, style), &style.detection),
+        Sample::Placed => canvas.circles(&[Curve::circle(at, 6.2 * unit)], &style.detection),
         Sample::Ground => {
             let ground = vec![block(9.5, 5.0)];
             canvas.fill(&ground, style.tint);

@@ -3,7 +3,7 @@
 use super::canvas::Canvas;
 use super::curve::{Curve, clipped};
 use super::grid::Grid;
-use super::style::{Frame, Line, Style};
+use super::style::{Frame, Style};
 use super::{Annotation, Counts, DetectionMark, ObjectMark};
 use crate::frame::Pixel;
 
@@ -14,13 +14,14 @@ pub(super) struct Marks<'a> {
     covered: Vec<Vec<[f64; 2]>>,
     boxes: Vec<[[f64; 2]; 4]>,
     points: Vec<Pixel>,
+    placed: Vec<Curve>,
 }
 
 /// An object's ring and ellipse.
 pub(super) struct Ring<'a> {
     pub(super) object: &'a ObjectMark,
     pub(super) radius: f64,
-    circle: Vec<[f64; 2]>,
+    circle: Curve,
     ellipse: Option<Vec<[f64; 2]>>,
 }
 
@@ -43,6 +44,11 @@ impl<'a> Marks<'a> {
                 .collect(),
             boxes: Vec::new(),
             points: Vec::new(),
+            placed: annotation
+                .placed
+                .iter()
+                .filter_map(|mark| circle(mark.centre, mark.radius_px, style))
+                .collect(),
         };
         for &detection in &annotation.detections {
             match detection {
@@ -65,6 +71,7 @@ impl<'a> Marks<'a> {
         marks.counts = Counts {
             boxes: marks.boxes.len(),
             points: marks.points.len(),
+            placed: marks.placed.len(),
             detected,
             missed: marks.rings.len() - detected,
             ellipses: marks.rings.iter().filter(|r| r.ellipse.is_some()).count(),
@@ -81,13 +88,16 @@ impl<'a> Marks<'a> {
         for point in &self.points {
             grid.take_disc([point.u, point.v], 5.0 * style.unit);
         }
+        for circle in &self.placed {
+            grid.cross(&circle.points());
+        }
         for ring in &self.rings {
             let centre = [ring.object.centre.u, ring.object.centre.v];
             // Names may stand inside of a boulder that fills the picture.
             if ring.radius < 40.0 * style.unit {
                 grid.take_disc(centre, ring.radius + 2.0 * style.unit);
             } else {
-                grid.take_points(&ring.circle);
+                grid.take_points(&ring.circle.points());
             }
             if let Some(ellipse) = &ring.ellipse {
                 grid.cross(ellipse);
@@ -104,52 +114,58 @@ impl<'a> Marks<'a> {
         canvas.closed(&self.boxes, &style.detection);
         let ticks: Vec<_> = self.points.iter().flat_map(|&p| ticks(p, style)).collect();
         canvas.open(&ticks, &style.detection);
+        canvas.circles(&self.placed, &style.detection);
         for detected in [false, true] {
-            let rings = || self.rings.iter().filter(|r| r.object.detected == detected);
-            let ellipses: Vec<_> = rings().filter_map(|r| r.ellipse.as_ref()).collect();
-            draw_object(canvas, style, detected, &ellipses, &style.ellipse(detected));
+            let rings = self.rings.iter().filter(|r| r.object.detected == detected);
+            let ellipses: Vec<_> = rings.filter_map(|r| r.ellipse.as_ref()).collect();
+            let line = style.ellipse(detected);
+            if detected {
+                canvas.closed(&ellipses, &line);
+            } else {
+                canvas.dashed(&ellipses, &line, style.dash);
+            }
         }
         for detected in [false, true] {
             let rings = self.rings.iter().filter(|r| r.object.detected == detected);
-            let circles: Vec<_> = rings.map(|ring| &ring.circle).collect();
-            draw_object(canvas, style, detected, &circles, &style.ring(detected));
+            let circles: Vec<_> = rings.map(|ring| ring.circle).collect();
+            draw_rings(canvas, style, detected, &circles);
         }
     }
 }
 
 impl<'a> Ring<'a> {
     fn of(object: &'a ObjectMark, style: &Style) -> Option<Self> {
-        let radius = object.radius_px.max(style.min_ring_radius);
-        let in_reach = radius <= style.max_half_axis && !object.radius_px.is_nan();
-        let circle = Curve::circle(object.centre, radius);
-        let finite = object.centre.u.is_finite() && object.centre.v.is_finite();
-        let circle = (in_reach && finite).then(|| circle.points())?;
-        Frame::about(&circle).filter(|frame| frame.meets(&style.picture()))?;
+        let circle = circle(object.centre, object.radius_px, style)?;
         let ellipse = Curve::ellipse_95(object.centre, object.covariance_px)
             .filter(|e| (style.min_ellipse..=style.max_half_axis).contains(&e.reach))
             .map(|ellipse| ellipse.points());
         Some(Self {
             object,
-            radius,
+            radius: circle.reach,
             circle,
             ellipse,
         })
     }
 }
 
-/// Draws closed curves as those of objects, solid where this view detected them and dashed where it
-/// did not.
-pub(super) fn draw_object(
-    canvas: &mut Canvas,
-    style: &Style,
-    detected: bool,
-    curves: &[&Vec<[f64; 2]>],
-    line: &Line,
-) {
+/// The circle of an object of this radius, no smaller than one that can be seen; `None` where it is
+/// out of the picture, or so large that its projection means nothing.
+fn circle(centre: Pixel, radius_px: f64, style: &Style) -> Option<Curve> {
+    let radius = radius_px.max(style.min_ring_radius);
+    let (u, v) = (centre.u, centre.v);
+    let about = Frame::about(&[[u - radius, v - radius], [u + radius, v + radius]])?;
+    let is_seen = about.meets(&style.picture()) && radius <= style.max_half_axis;
+    (is_seen && !radius_px.is_nan()).then(|| Curve::circle(centre, radius))
+}
+
+/// Draws the rings of objects, solid where this view detected them and dashed where it did not.
+pub(super) fn draw_rings(canvas: &mut Canvas, style: &Style, detected: bool, circles: &[Curve]) {
+    let line = style.ring(detected);
     if detected {
-        canvas.closed(curves, line);
+        canvas.circles(circles, &line);
     } else {
-        canvas.dashed(curves, line, 13.0 * style.unit);
+        let points: Vec<_> = circles.iter().map(Curve::points).collect();
+        canvas.dashed(&points, &line, style.dash);
     }
 }
 

@@ -9,6 +9,7 @@
 //! |---|---|
 //! | ground that other views cover | sky-blue tint with a thin edge |
 //! | detection | thin white box, or four ticks about a point |
+//! | detection with a place on the ground, in pictures of one view alone | thin white circle |
 //! | fused rock that this view detected | solid yellow ring |
 //! | fused rock that it did not detect | dashed orange ring |
 //! | 95 % ellipse of a fused rock | thin line in the ring's colour, solid or dashed as the ring |
@@ -18,6 +19,7 @@
 //! ground. All sizes follow the picture's.
 
 mod canvas;
+mod content;
 mod curve;
 mod fill;
 mod grid;
@@ -31,13 +33,16 @@ mod text;
 use nalgebra::Matrix2;
 
 use crate::frame::Pixel;
-use crate::publish::picture::Picture;
+use crate::publish::picture::{Picture, PictureError};
 
 use canvas::Canvas;
 use grid::Grid;
 use marks::Marks;
 use style::Style;
 use text::Typesetter;
+
+/// What drawings look like: raised whenever the same annotation comes to give other pixels.
+pub const DRAWING: u32 = 1;
 
 /// What is drawn on one picture. Everything may lie partly or wholly outside of it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -48,6 +53,8 @@ pub struct Annotation {
     pub covered: Vec<Vec<Pixel>>,
     /// The detections of this view.
     pub detections: Vec<DetectionMark>,
+    /// The detections that have a place on the ground, where the picture shows this view alone.
+    pub placed: Vec<PlacedMark>,
     /// The fused objects that project into this view.
     pub objects: Vec<ObjectMark>,
 }
@@ -68,6 +75,15 @@ pub enum DetectionMark {
     },
     /// A point.
     Point(Pixel),
+}
+
+/// A detection that has a place on the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlacedMark {
+    /// Where the place projects.
+    pub centre: Pixel,
+    /// The radius of what was detected, pixels; it is drawn no smaller than a ring that can be seen.
+    pub radius_px: f64,
 }
 
 /// A fused object as this view sees it.
@@ -94,6 +110,8 @@ pub struct Counts {
     pub boxes: usize,
     /// Detections given as points.
     pub points: usize,
+    /// Detections with a place on the ground.
+    pub placed: usize,
     /// Fused objects that this view detected.
     pub detected: usize,
     /// Fused objects that it did not detect.
@@ -126,6 +144,30 @@ pub fn annotate(picture: &mut Picture, annotation: &Annotation) -> Counts {
         legend.draw(&mut canvas, &style, &typesetter);
     }
     marks.counts
+}
+
+/// Draws one annotation, or several of the same picture side by side.
+///
+/// # Errors
+/// [`PictureError::Size`], of pictures that together are too large.
+pub fn annotate_panels(
+    mut picture: Picture,
+    panels: &[Annotation],
+) -> Result<Picture, PictureError> {
+    let Some((first, others)) = panels.split_first() else {
+        return Ok(picture);
+    };
+    let others = others.iter().map(|annotation| {
+        let mut copy = picture.clone();
+        annotate(&mut copy, annotation);
+        copy
+    });
+    let others: Vec<Picture> = others.collect();
+    annotate(&mut picture, first);
+    let gap = Style::for_size(picture.width(), picture.height()).gap;
+    others
+        .iter()
+        .try_fold(picture, |left, right| left.beside(right, gap))
 }
 
 impl Annotation {

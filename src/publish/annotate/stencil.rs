@@ -43,6 +43,14 @@ impl Stencil {
         }
     }
 
+    /// Adds the sides of a closed polygon, as far as `reach` from them.
+    pub(super) fn polygon(&mut self, points: &[[f64; 2]], reach: f64) {
+        for (index, &start) in points.iter().enumerate() {
+            let end = points[(index + 1) % points.len()];
+            self.segment([start, end], reach, 1.0);
+        }
+    }
+
     /// Adds the line from one point to another, pixels, as far as `reach` from it. Beyond the line's
     /// ends distances count `bluntness` times: round ends have 1, blunter ones more.
     pub(super) fn segment(&mut self, [from, to]: [[f64; 2]; 2], reach: f64, bluntness: f64) {
@@ -56,29 +64,52 @@ impl Stencil {
         } else {
             (1.0, 0.0)
         };
+        let run = Run {
+            from,
+            step: (ux, uy),
+            length: narrow(length),
+            bluntness: narrow(bluntness),
+        };
+        // Of an oblique line, a row meets only the strip as wide as the line's reach.
+        let strip = (uy.abs() > 1e-6).then(|| (ux / uy, reach / uy.abs()));
         let rows = span(frame.top - reach, frame.bottom + reach, self.height);
-        for row in rows {
-            let y = f64::from(u32::try_from(row).unwrap_or(u32::MAX)) - from[1];
-            // Of an oblique line, a row meets only the strip as wide as the line's reach.
+        for top in (rows.start / TILE * TILE..rows.end).step_by(TILE) {
+            let rows = rows.start.max(top)..rows.end.min(top + TILE);
             let (mut left, mut right) = (frame.left - reach, frame.right + reach);
-            if uy.abs() > 1e-6 {
-                let middle = from[0] + y * ux / uy;
-                let half = reach / uy.abs();
-                left = left.max(middle - half);
-                right = right.min(middle + half);
+            if let Some((slope, half)) = strip {
+                let [first, last] =
+                    [rows.start, rows.end - 1].map(|row| from[0] + (float(row) - from[1]) * slope);
+                left = left.max(first.min(last) - half);
+                right = right.min(first.max(last) + half);
             }
             let columns = span(left, right, self.width);
-            if columns.is_empty() {
-                continue;
+            for start in (columns.start / TILE * TILE..columns.end).step_by(TILE) {
+                let tile = self.tile(start, top);
+                for row in rows.clone() {
+                    let line = (row - top) * TILE;
+                    run.lower((start, row), &mut tile.squares[line..line + TILE]);
+                }
             }
-            let run = Run {
-                along: y * uy - from[0] * ux,
-                across: -from[0] * uy - y * ux,
-                step: (ux, uy),
-                length: narrow(length),
-                bluntness: narrow(bluntness),
+        }
+    }
+
+    /// Adds a circle, as far as `reach` from it.
+    pub(super) fn circle(&mut self, [u, v]: [f64; 2], radius: f64, reach: f64) {
+        let (outer, inner) = (radius + reach, (radius - reach).max(0.0));
+        for row in span(v - outer, v + outer, self.height) {
+            let y = float(row) - v;
+            let half = (outer * outer - y * y).max(0.0).sqrt();
+            let hole = (inner * inner - y * y).max(0.0).sqrt();
+            let arc = Arc { u, y, radius };
+            let sides = if hole > 0.0 {
+                [(u - half, u - hole), (u + hole, u + half)]
+            } else {
+                [(u - half, u + half), (u, u)]
             };
-            self.run(row, columns, &run);
+            for (left, right) in sides {
+                let columns = span(left, right, self.width);
+                self.row(row, columns, |start, squares| arc.lower(start, squares));
+            }
         }
     }
 
@@ -96,11 +127,19 @@ impl Stencil {
     }
 
     /// Lowers the distances along a row, in all tiles that the columns touch.
-    fn run(&mut self, row: usize, columns: std::ops::Range<usize>, run: &Run) {
+    fn row(
+        &mut self,
+        row: usize,
+        columns: std::ops::Range<usize>,
+        lower: impl Fn(usize, &mut [f32]),
+    ) {
+        if columns.is_empty() {
+            return;
+        }
         let line = (row % TILE) * TILE;
         for start in (columns.start / TILE * TILE..columns.end).step_by(TILE) {
             let tile = self.tile(start, row);
-            run.lower(start, &mut tile.squares[line..line + TILE]);
+            lower(start, &mut tile.squares[line..line + TILE]);
         }
     }
 
@@ -125,11 +164,10 @@ impl Line {
     }
 }
 
-/// A row of pixels seen from a segment: how far along it and across from it the row's first pixel
-/// lies, and each next one farther.
+/// A segment that pixels are seen from: along it and across from it.
 struct Run {
-    along: f64,
-    across: f64,
+    from: [f64; 2],
+    /// Its direction.
     step: (f64, f64),
     length: f32,
     bluntness: f32,
@@ -138,10 +176,10 @@ struct Run {
 impl Run {
     /// Lowers the squared distances of sixteen pixels from a column on: always all of a tile's row,
     /// so that the compiler can do many at once.
-    fn lower(&self, column: usize, squares: &mut [f32]) {
-        let column = f64::from(u32::try_from(column).unwrap_or(u32::MAX));
-        let along = narrow(self.along + column * self.step.0);
-        let across = narrow(self.across + column * self.step.1);
+    fn lower(&self, (column, row): (usize, usize), squares: &mut [f32]) {
+        let (x, y) = (float(column) - self.from[0], float(row) - self.from[1]);
+        let along = narrow(x * self.step.0 + y * self.step.1);
+        let across = narrow(x * self.step.1 - y * self.step.0);
         let step = (narrow(self.step.0), narrow(self.step.1));
         for (square, index) in squares.iter_mut().zip(INDICES) {
             let along = along + index * step.0;
@@ -155,10 +193,35 @@ impl Run {
     }
 }
 
+/// A row of pixels seen from a circle's centre.
+struct Arc {
+    u: f64,
+    y: f64,
+    radius: f64,
+}
+
+impl Arc {
+    /// As [`Run::lower`].
+    fn lower(&self, column: usize, squares: &mut [f32]) {
+        let (x, y) = (narrow(float(column) - self.u), narrow(self.y));
+        let (y_square, radius) = (y * y, narrow(self.radius));
+        for (square, index) in squares.iter_mut().zip(INDICES) {
+            let x = x + index;
+            let off = (x * x + y_square).sqrt() - radius;
+            let here = off * off;
+            *square = if here < *square { here } else { *square };
+        }
+    }
+}
+
 /// The columns of a tile.
 const INDICES: [f32; TILE] = [
     0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
 ];
+
+fn float(pixel: usize) -> f64 {
+    f64::from(u32::try_from(pixel).unwrap_or(u32::MAX))
+}
 
 /// The pixels between two coordinates.
 fn span(from: f64, to: f64, count: usize) -> std::ops::Range<usize> {
@@ -214,5 +277,39 @@ mod tests {
         assert_eq!(near, expected_near);
         stencil.clear();
         assert!(stencil.tiles().is_empty() && stencil.numbers.iter().all(|&n| n == 0));
+    }
+
+    #[test]
+    fn distances_to_circles_are_those_of_the_formula() {
+        for (centre, radius) in [
+            ([20.3, 17.6], 12.25),
+            ([25.0, 20.0], 2.0),
+            ([-300.0, 20.0], 320.5),
+        ] {
+            let mut stencil = Stencil::new(50, 40);
+            stencil.circle(centre, radius, 3.5);
+            let mut squares = vec![f32::INFINITY; 50 * 40];
+            for tile in stencil.tiles() {
+                for (index, &square) in tile.squares.iter().enumerate() {
+                    let (x, y) = (tile.column + index % TILE, tile.row + index / TILE);
+                    if x < 50 && y < 40 {
+                        squares[y * 50 + x] = square;
+                    }
+                }
+            }
+            let mut near = 0;
+            for (index, &square) in squares.iter().enumerate() {
+                let (x, y) = (float(index % 50), float(index / 50));
+                let expected = ((x - centre[0]).hypot(y - centre[1]) - radius).abs();
+                if expected < 3.5 {
+                    near += 1;
+                    assert!(
+                        (f64::from(square).sqrt() - expected).abs() < 1e-3,
+                        "{x} {y}"
+                    );
+                }
+            }
+            assert!(near > 50, "{near}");
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Colours and sizes.
 
+use super::grid::whole;
+
 /// Red, green, blue and opacity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Colour {
@@ -60,11 +62,15 @@ pub(super) struct Style {
     pub(super) text: Colour,
     pub(super) text_halo: Colour,
     pub(super) min_ring_radius: f64,
+    /// A dash and its gap, pixels.
+    pub(super) dash: f64,
     /// A 95 % ellipse whose long half-axis is shorter is left out.
     pub(super) min_ellipse: f64,
     /// A ring or ellipse whose long half-axis is longer is left out: a projection linearised so
     /// far from its centre means nothing.
     pub(super) max_half_axis: f64,
+    /// Between two pictures side by side, pixels.
+    pub(super) gap: u32,
     pub(super) label_size: f64,
     pub(super) body_size: f64,
     pub(super) title_size: f64,
@@ -91,8 +97,10 @@ impl Style {
             text: Colour::new(WHITE, 255),
             text_halo: Colour::new(NEAR_BLACK, 215),
             min_ring_radius: 7.0 * unit,
+            dash: 13.0 * unit,
             min_ellipse: (1.5 * unit).max(1.5),
             max_half_axis: 100.0 * width.hypot(height),
+            gap: u32::try_from(whole(8.0 * unit)).unwrap_or(u32::MAX),
             label_size: (11.5 * unit).max(9.0),
             body_size: (13.0 * unit).max(9.5),
             title_size: (14.0 * unit).max(10.0),

@@ -223,6 +223,7 @@ fn counts_are_of_what_lies_in_the_picture() {
     let expected = Counts {
         boxes: 1,
         points: 1,
+        placed: 0,
         detected: 1,
         missed: 2,
         ellipses: 1,
@@ -245,6 +246,7 @@ fn the_legend_says_what_there_is() {
     let counts = Counts {
         boxes: 52,
         points: 1,
+        placed: 0,
         detected: 41,
         missed: 1,
         ellipses: 40,
@@ -454,4 +456,53 @@ fn any_size_can_be_drawn_on() {
         annotate(&mut picture, &scene());
         assert_eq!((picture.width(), picture.height()), (width, height));
     }
+}
+
+#[test]
+fn what_this_view_alone_placed_is_circled_in_white() {
+    let annotation = Annotation {
+        placed: vec![
+            PlacedMark {
+                centre: Pixel::new(400.0, 300.0),
+                radius_px: 40.0,
+            },
+            PlacedMark {
+                centre: Pixel::new(-100.0, 300.0),
+                radius_px: 40.0,
+            },
+            PlacedMark {
+                centre: Pixel::new(200.0, f64::NAN),
+                radius_px: 40.0,
+            },
+        ],
+        ..Annotation::default()
+    };
+    assert_eq!(annotation.counts(640, 480).placed, 1);
+    let picture = drawn(60, &annotation);
+    for step in 0..72u32 {
+        let (sin, cos) = (f64::from(step) / 72.0 * TAU).sin_cos();
+        let [r, g, b] = at(&picture, 400.0 + 40.0 * cos, 300.0 + 40.0 * sin);
+        let is_grey = r.abs_diff(g) < 10 && g.abs_diff(b) < 10;
+        assert!(r > 120 && is_grey, "{step}: {r} {g} {b}");
+    }
+    assert_eq!(at(&picture, 400.0, 300.0), [60; 3]);
+}
+
+#[test]
+fn panels_are_the_same_picture_drawn_twice_side_by_side() {
+    let left = of_objects(vec![ring(400.0, 300.0, 40.0, true)]);
+    let right = of_objects(vec![ring(300.0, 200.0, 40.0, false)]);
+    let panels = annotate_panels(plain(60), &[left.clone(), right.clone()]).unwrap();
+    let gap = Style::for_size(640, 480).gap;
+    assert_eq!((panels.width(), panels.height()), (1280 + gap, 480));
+    let (one, two) = (drawn(60, &left), drawn(60, &right));
+    for y in 0..480 {
+        for x in 0..640 {
+            assert_eq!(panels.colour(x, y), one.colour(x, y));
+            assert_eq!(panels.colour(x + 640 + gap, y), two.colour(x, y));
+        }
+        assert_eq!(panels.colour(640, y), Some([255; 3]));
+    }
+    assert_eq!(annotate_panels(plain(60), &[left]).unwrap(), one);
+    assert_eq!(annotate_panels(plain(60), &[]).unwrap(), plain(60));
 }

@@ -13,6 +13,9 @@ const APP0: u8 = 0xe0;
 const APP1: u8 = 0xe1;
 const APP2: u8 = 0xe2;
 
+/// What the content of an EXIF segment begins with.
+const EXIF: &[u8] = b"Exif\0\0";
+
 /// What libjpeg complains of in files that decode as they should.
 const HARMLESS: [&str; 4] = [
     "extraneous bytes before marker",
@@ -42,12 +45,17 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
     }
     let mut picture = Picture::from_parts(width, height, rgba);
     picture.metadata = metadata(bytes);
+    picture.colour = match decompressor.read_header(bytes).map(|header| header.subsamp) {
+        // What is drawn on a grey picture is in colour.
+        Ok(Subsamp::Gray) | Err(_) => Subsamp::None,
+        Ok(known) => known,
+    };
     Ok(picture)
 }
 
-/// Encodes in 4:4:4, with the metadata after the JFIF header.
+/// Encodes with colour as fine as in the source, and with the metadata after the JFIF header.
 pub(super) fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>, String> {
-    let plain = compress(picture, quality, Subsamp::None, false)?;
+    let plain = compress(picture, quality, picture.colour, false)?;
     let body = Segments::new(&plain)
         .take_while(|segment| segment.marker == APP0)
         .last()
@@ -148,6 +156,17 @@ fn metadata(bytes: &[u8]) -> Vec<Vec<u8>> {
         })
         .map(|segment| bytes[segment.start..segment.end].to_vec())
         .collect()
+}
+
+/// EXIF, without its name, as a segment of a JPEG, if it fits into one.
+pub(super) fn exif_segment(exif: &[u8]) -> Option<Vec<u8>> {
+    let length = u16::try_from(2 + EXIF.len() + exif.len()).ok()?;
+    Some([&[0xff, APP1], length.to_be_bytes().as_slice(), EXIF, exif].concat())
+}
+
+/// The EXIF that a segment holds, without its name.
+pub(super) fn exif_of(segment: &[u8]) -> Option<&[u8]> {
+    segment.get(4..)?.strip_prefix(EXIF)
 }
 
 /// One marker segment: from its 0xff to the end of its content.

@@ -1,8 +1,8 @@
-//! Pictures: read from JPEG, PNG and TIFF, written as JPEG and PNG, compared.
+//! Pictures: read from JPEG, PNG and TIFF, written as any of them, compared.
 //!
 //! A picture is held as its raw raster. The orientation tag of EXIF is **not** applied: pixel
 //! coordinates of detections and camera models are those of the raster as it was stored, and a
-//! JPEG that is written again carries the tag on, so that a viewer turns both alike.
+//! JPEG or PNG that is written again carries the tag on, so that a viewer turns both alike.
 
 mod difference;
 mod jpeg;
@@ -13,6 +13,9 @@ use std::fmt;
 use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::Path;
+
+use serde::Serialize;
+use turbojpeg::Subsamp;
 
 use crate::error::{Error, Fault, Place};
 
@@ -27,12 +30,15 @@ pub struct Picture {
     width: u32,
     height: u32,
     rgba: Vec<u8>,
-    /// Segments of the source JPEG that belong to any copy of it: EXIF, XMP, colour profile.
+    /// What belongs to any copy of the source, as segments of a JPEG: EXIF, XMP, colour profile.
     metadata: Vec<Vec<u8>>,
+    /// How coarsely the source JPEG had its colour, so that a copy has it as finely.
+    colour: Subsamp,
 }
 
 /// The kinds of files that pictures are read from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Format {
     /// JPEG (ISO/IEC 10918-1), grey or colour, 8 bits.
     Jpeg,
@@ -159,29 +165,62 @@ impl Picture {
         size.map_err(|e| fault(shown, &e))
     }
 
-    /// Writes a JPEG (`.jpg`, `.jpeg`) of quality 1 to 100, or a PNG (`.png`).
+    /// Writes a JPEG (`.jpg`, `.jpeg`) of quality 1 to 100, a PNG (`.png`) or a TIFF (`.tif`, `.tiff`).
     ///
-    /// JPEG keeps its colour at full resolution (4:4:4), because halving it frays thin coloured
-    /// lines, and carries the EXIF, XMP and ICC segments of the JPEG it was read from. The file is
+    /// A JPEG has its colour at the resolution of the JPEG it was read from, at full resolution (4:4:4) where
+    /// there was none or that was grey, and carries its EXIF, XMP and ICC segments; a PNG carries EXIF. The file is
     /// written under a temporary name beside `path` and renamed, so it is there whole or not at
     /// all. The same picture gives the same bytes.
     ///
     /// # Errors
     /// Another extension, a folder that cannot be written to.
     pub fn write(&self, path: &Path, quality: u8) -> Result<(), Error> {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-        let bytes = match extension.to_ascii_lowercase().as_str() {
-            "jpg" | "jpeg" => self.to_jpeg(quality),
-            "png" => self.to_png(),
-            _ => {
-                return Err(Error::Output(format!(
-                    "{}: found extension {extension:?}, expected jpg, jpeg or png",
-                    path.display()
-                )));
-            }
+        let Some(format) = Format::by_name(path) else {
+            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+            return Err(Error::Output(format!(
+                "{}: found extension {extension:?}, expected jpg, jpeg, png, tif or tiff",
+                path.display()
+            )));
         };
-        let bytes = bytes.map_err(|why| Error::Output(format!("{}: {why}", path.display())))?;
+        let bytes = self
+            .encode(format, quality)
+            .map_err(|why| Error::Output(format!("{}: {why}", path.display())))?;
         write_whole(path, &bytes).map_err(|e| Error::io(path, "write", e))
+    }
+
+    /// The bytes of a file of this format, as [`Picture::write`].
+    ///
+    /// # Errors
+    /// The encoder's words.
+    pub fn encode(&self, format: Format, quality: u8) -> Result<Vec<u8>, String> {
+        match format {
+            Format::Jpeg => self.to_jpeg(quality),
+            Format::Png => self.to_png(),
+            Format::Tiff => raster::encode_tiff(self),
+        }
+    }
+
+    /// This picture and another at its right, white of `gap` columns between them and below the
+    /// lower of the two. Metadata and colour resolution are those of this one.
+    ///
+    /// # Errors
+    /// [`PictureError::Size`].
+    pub fn beside(&self, right: &Self, gap: u32) -> Result<Self, PictureError> {
+        let height = self.height.max(right.height);
+        let width = u64::from(self.width) + u64::from(gap) + u64::from(right.width);
+        let width = u32::try_from(width).unwrap_or(u32::MAX);
+        let mut joined = Self::of_colour(width, height, [255; 3])?;
+        let row_bytes = width as usize * 4;
+        for (picture, column) in [(self, 0), (right, self.width as usize + gap as usize)] {
+            let bytes = picture.width as usize * 4;
+            let rows = picture.rgba.chunks_exact(bytes);
+            for (row, onto) in rows.zip(joined.rgba.chunks_exact_mut(row_bytes)) {
+                onto[column * 4..column * 4 + bytes].copy_from_slice(row);
+            }
+        }
+        joined.metadata.clone_from(&self.metadata);
+        joined.colour = self.colour;
+        Ok(joined)
     }
 
     /// The bytes of a JPEG file of this quality (1 to 100, clamped), as [`Picture::write`].
@@ -246,6 +285,7 @@ impl Picture {
             height,
             rgba,
             metadata: Vec::new(),
+            colour: Subsamp::None,
         }
     }
 }
@@ -257,6 +297,26 @@ impl fmt::Debug for Picture {
 }
 
 impl Format {
+    /// The format that a file's extension names.
+    pub fn by_name(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "jpg" | "jpeg" => Some(Self::Jpeg),
+            "png" => Some(Self::Png),
+            "tif" | "tiff" => Some(Self::Tiff),
+            _ => None,
+        }
+    }
+
+    /// The extension of files of this format.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Jpeg => "jpg",
+            Self::Png => "png",
+            Self::Tiff => "tif",
+        }
+    }
+
     /// The format that the first bytes of a file announce.
     ///
     /// # Errors

@@ -4,9 +4,14 @@ use std::error::Error as _;
 use std::io::{BufRead, Cursor, ErrorKind, Read, Seek, SeekFrom};
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ExtendedColorType, ImageEncoder, ImageError, ImageFormat, ImageReader};
+use image::{
+    DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat,
+    ImageReader,
+};
+use tiff::encoder::colortype::RGB8;
+use tiff::encoder::{Compression, DeflateLevel, Predictor, TiffEncoder};
 
-use super::{Format, Picture, PictureError, pixel_count};
+use super::{Format, Picture, PictureError, jpeg, pixel_count};
 
 /// The shares of all samples that a stretch sends to black and to white, per cent of two hundred.
 const BLACK_PER_200: u64 = 1;
@@ -18,7 +23,10 @@ pub(super) fn decode(bytes: &[u8], format: Format) -> Result<Picture, PictureErr
     pixel_count(width, height)?;
     let mut reader = ImageReader::with_format(Cursor::new(bytes), kind(format));
     reader.no_limits();
-    let image = reader.decode().map_err(|e| problem(&e, format))?;
+    let mut decoder = reader.into_decoder().map_err(|e| problem(&e, format))?;
+    // A picture whose EXIF cannot be read is one without.
+    let exif = decoder.exif_metadata().ok().flatten();
+    let image = DynamicImage::from_decoder(decoder).map_err(|e| problem(&e, format))?;
     let image = match image {
         DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => stretched_grey(&image),
         DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => stretched_colour(&image),
@@ -34,7 +42,12 @@ pub(super) fn decode(bytes: &[u8], format: Format) -> Result<Picture, PictureErr
     for pixel in rgba.chunks_exact_mut(4) {
         pixel[3] = 255;
     }
-    Ok(Picture::from_parts(width, height, rgba))
+    let mut picture = Picture::from_parts(width, height, rgba);
+    picture.metadata = exif
+        .and_then(|exif| jpeg::exif_segment(&exif))
+        .into_iter()
+        .collect();
+    Ok(picture)
 }
 
 /// Columns and rows from the header; the start of the file may have been read already.
@@ -53,16 +66,38 @@ pub(super) fn size<R: BufRead + Seek>(
 
 /// The bytes of an 8-bit RGB PNG.
 pub(super) fn encode_png(picture: &Picture) -> Result<Vec<u8>, String> {
-    let rgb: Vec<u8> = picture
-        .rgba
-        .chunks_exact(4)
-        .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
-        .collect();
     let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(&rgb, picture.width, picture.height, ExtendedColorType::Rgb8)
+    let mut encoder =
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+    if let Some(exif) = picture.metadata.iter().find_map(|s| jpeg::exif_of(s)) {
+        encoder
+            .set_exif_metadata(exif.to_vec())
+            .map_err(|e| e.to_string())?;
+    }
+    let (width, height) = (picture.width, picture.height);
+    encoder
+        .write_image(&rgb(picture), width, height, ExtendedColorType::Rgb8)
         .map_err(|e| e.to_string())?;
     Ok(bytes)
+}
+
+/// The bytes of an 8-bit RGB TIFF, deflated.
+pub(super) fn encode_tiff(picture: &Picture) -> Result<Vec<u8>, String> {
+    let mut file = Cursor::new(Vec::new());
+    let encoder = TiffEncoder::new(&mut file).map_err(|e| e.to_string())?;
+    encoder
+        .with_compression(Compression::Deflate(DeflateLevel::Fast))
+        .with_predictor(Predictor::Horizontal)
+        .write_image::<RGB8>(picture.width, picture.height, &rgb(picture))
+        .map_err(|e| e.to_string())?;
+    Ok(file.into_inner())
+}
+
+fn rgb(picture: &Picture) -> Vec<u8> {
+    let pixels = picture.rgba.chunks_exact(4);
+    pixels
+        .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
+        .collect()
 }
 
 /// The PNG specification, 5.2 and 11.2.1: signature, chunk length and name, then both sides.

@@ -259,7 +259,7 @@ fn files_are_named_by_their_faults() {
 fn writing_leaves_the_whole_file_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let picture = ramp(40, 30);
-    for name in ["a.JPG", "b.jpeg", "c.png"] {
+    for name in ["a.JPG", "b.jpeg", "c.png", "d.TIF", "e.tiff"] {
         picture.write(&folder.path().join(name), 90).unwrap();
     }
     let mut names: Vec<String> = std::fs::read_dir(folder.path())
@@ -267,17 +267,17 @@ fn writing_leaves_the_whole_file_and_nothing_else() {
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
-    assert_eq!(names, ["a.JPG", "b.jpeg", "c.png"]);
+    assert_eq!(names, ["a.JPG", "b.jpeg", "c.png", "d.TIF", "e.tiff"]);
+    for name in ["c.png", "d.TIF", "e.tiff"] {
+        let again = Picture::read(&folder.path().join(name), name).unwrap();
+        assert_eq!(again, picture, "{name}");
+    }
+    let bitmap = folder.path().join("f.bmp");
     assert_eq!(
-        Picture::read(&folder.path().join("c.png"), "c.png").unwrap(),
-        picture
-    );
-    let tiff = folder.path().join("d.tif");
-    assert_eq!(
-        picture.write(&tiff, 90).unwrap_err().to_string(),
+        picture.write(&bitmap, 90).unwrap_err().to_string(),
         format!(
-            "{}: found extension \"tif\", expected jpg, jpeg or png",
-            tiff.display()
+            "{}: found extension \"bmp\", expected jpg, jpeg, png, tif or tiff",
+            bitmap.display()
         )
     );
     let nowhere = folder.path().join("none/e.png");
@@ -309,4 +309,75 @@ fn the_difference_is_that_of_the_worst_spot() {
     // Smaller than a window, and not a multiple of a block.
     let small = |value| Picture::of_colour(3, 5, [value; 3]).unwrap();
     assert!((perceptual_difference(&small(0), &small(51)) - 0.2).abs() < 1e-12);
+}
+
+#[test]
+fn a_jpeg_copy_has_its_colour_as_finely_as_the_source() {
+    use turbojpeg::{Image, PixelFormat};
+    let picture = ramp(64, 48);
+    let image = |rgba| Image {
+        pixels: rgba,
+        width: 64,
+        pitch: 256,
+        height: 48,
+        format: PixelFormat::RGBA,
+    };
+    for (source, copy) in [
+        (Subsamp::Sub2x2, Subsamp::Sub2x2),
+        (Subsamp::Sub2x1, Subsamp::Sub2x1),
+        (Subsamp::Sub1x2, Subsamp::Sub1x2),
+        (Subsamp::None, Subsamp::None),
+        (Subsamp::Gray, Subsamp::None),
+    ] {
+        let jpeg = turbojpeg::compress(image(picture.rgba()), 90, source).unwrap();
+        let written = Picture::decode(&jpeg).unwrap().to_jpeg(90).unwrap();
+        let header = turbojpeg::read_header(&written).unwrap();
+        assert_eq!(header.subsamp, copy, "{source:?}");
+    }
+    let mut compressor = turbojpeg::Compressor::new().unwrap();
+    compressor.set_progressive(true).unwrap();
+    compressor.set_subsamp(Subsamp::Sub2x2).unwrap();
+    let progressive = compressor.compress_to_vec(image(picture.rgba())).unwrap();
+    let written = Picture::decode(&progressive).unwrap().to_jpeg(90).unwrap();
+    let header = turbojpeg::read_header(&written).unwrap();
+    assert_eq!(
+        (header.subsamp, header.is_progressive),
+        (Subsamp::Sub2x2, false)
+    );
+}
+
+#[test]
+fn exif_goes_from_jpeg_to_png_and_back() {
+    let jpeg = ramp(48, 32).to_jpeg(85).unwrap();
+    let source = Picture::decode(&with_segments(&jpeg, &[exif_segment()])).unwrap();
+    let png = source.to_png().unwrap();
+    assert!(png.windows(4).any(|w| w == b"eXIf"));
+    let again = Picture::decode(&png).unwrap();
+    assert_eq!(
+        again,
+        Picture {
+            colour: Subsamp::None,
+            ..source.clone()
+        }
+    );
+    assert_eq!(again.metadata, [exif_segment()]);
+    let jpeg = Picture::decode(&again.to_jpeg(85).unwrap()).unwrap();
+    assert_eq!(jpeg.metadata, [exif_segment()]);
+}
+
+#[test]
+fn pictures_side_by_side_keep_their_pixels_and_metadata() {
+    let mut left = ramp(20, 30);
+    left.metadata = vec![exif_segment()];
+    left.colour = Subsamp::Sub2x2;
+    let right = Picture::of_colour(10, 25, [1, 2, 3]).unwrap();
+    let both = left.beside(&right, 4).unwrap();
+    assert_eq!((both.width(), both.height()), (34, 30));
+    assert_eq!(both.colour(19, 29), left.colour(19, 29));
+    assert_eq!(both.colour(24, 0), Some([1, 2, 3]));
+    assert_eq!(both.colour(33, 24), Some([1, 2, 3]));
+    for white in [(20, 0), (23, 29), (24, 25), (33, 29)] {
+        assert_eq!(both.colour(white.0, white.1), Some([255; 3]), "{white:?}");
+    }
+    assert_eq!((&both.metadata, both.colour), (&left.metadata, left.colour));
 }
