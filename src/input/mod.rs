@@ -8,6 +8,7 @@ mod asked;
 mod document;
 mod head;
 mod json;
+mod lists;
 mod odl;
 mod reject;
 mod rows;

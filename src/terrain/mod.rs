@@ -23,6 +23,7 @@ mod geotiff;
 mod grid;
 mod holes;
 mod leg;
+mod local;
 mod march;
 mod model;
 mod mosaic;
@@ -115,6 +116,10 @@ impl Terrain {
         grids: Vec<HeightGrid>,
         outside_m: Option<f64>,
     ) -> Result<Self, (usize, CrsError)> {
+        let grids: Vec<HeightGrid> = grids
+            .into_iter()
+            .map(|grid| local::on_planet(&site, grid))
+            .collect();
         let shape = match (grids.is_empty(), outside_m) {
             (true, Some(height_m)) => Shape::Constant(height_m),
             _ => Shape::Model(Box::new(Model::new(&site, grids, outside_m)?)),
