@@ -47,6 +47,33 @@ pub enum CrsError {
         /// What PROJ said.
         why: String,
     },
+    /// A system of another body.
+    #[error(
+        "found {found:?} ({own}, of {radius_km:.1} km), expected one of {body}, of {body_km:.1} km"
+    )]
+    OtherBody {
+        /// What was given.
+        found: String,
+        /// Its name.
+        own: String,
+        /// The radius of its body's equator, kilometres.
+        radius_km: f64,
+        /// The body it is to be of.
+        body: &'static str,
+        /// The radius of that body's equator, kilometres.
+        body_km: f64,
+    },
+    /// Not one that places of a map are written in.
+    #[error(
+        "found {found:?} ({own}), expected a map projection, or latitudes and eastward longitudes, \
+         without heights"
+    )]
+    NotHorizontal {
+        /// What was given.
+        found: String,
+        /// Its name.
+        own: String,
+    },
     /// A place outside the CRS's domain.
     #[error("({x}, {y}) lies outside the domain of {crs}")]
     OutsideDomain {
@@ -70,6 +97,17 @@ impl Crs {
     /// [`CrsError::Unknown`] where PROJ cannot relate it to the planet's geographic CRS.
     pub fn new(definition: &str, planet: Planet) -> Result<Self, CrsError> {
         let parts = Definition::of(definition)?;
+        if let Some(own) = parts.ellipsoid()
+            && !is_of_size(own, planet.ellipsoid)
+        {
+            return Err(CrsError::OtherBody {
+                found: definition.to_owned(),
+                own: parts.name().to_owned(),
+                radius_km: own.a / 1000.0,
+                body: planet.name,
+                body_km: planet.ellipsoid.a / 1000.0,
+            });
+        }
         // On other bodies maps on a sphere and on an ellipsoid stand side by side, and PROJ takes the
         // latitude of the one for that of the other. On Earth it knows the ways between datums.
         let flattening = parts.ellipsoid().map(|ellipsoid| ellipsoid.f);
@@ -100,6 +138,22 @@ impl Crs {
         };
         crs.converter()?;
         Ok(crs)
+    }
+
+    /// The system of a definition, where places of a map can be written in it: two-dimensional, either
+    /// projected or with latitudes and eastward longitudes.
+    ///
+    /// # Errors
+    /// As [`Crs::new`], and [`CrsError::NotHorizontal`].
+    pub fn for_map(definition: &str, planet: Planet) -> Result<Self, CrsError> {
+        let parts = Definition::of(definition)?;
+        if !parts.is_horizontal() || (parts.is_geodetic() && parts.is_west_positive()) {
+            return Err(CrsError::NotHorizontal {
+                found: definition.to_owned(),
+                own: parts.name().to_owned(),
+            });
+        }
+        Self::new(definition, planet)
     }
 
     /// Whether a definition is one that PROJ understands, on whatever planet.
@@ -230,6 +284,15 @@ fn geodetic_latitude(lat: f64, from: f64, to: f64) -> f64 {
     (sin * (1.0 - from).powi(2)).atan2(cos * (1.0 - to).powi(2))
 }
 
+/// Whether an ellipsoid is of a body's size: datums of one body differ by less than a hundredth, and so do
+/// spheres of its equatorial and of its polar radius from either.
+fn is_of_size(own: Ellipsoid, body: Ellipsoid) -> bool {
+    let polar = body.a * (1.0 - body.f);
+    [body.a, polar]
+        .into_iter()
+        .any(|radius| (own.a / radius - 1.0).abs() < 0.01)
+}
+
 fn finite(x: f64, y: f64) -> Option<(f64, f64)> {
     (x.is_finite() && y.is_finite()).then_some((x, y))
 }
@@ -303,6 +366,65 @@ mod tests {
             let turn = crs.convergence(place).unwrap() + f64::to_radians(lon);
             assert!(turn.sin().abs() < 1e-8 && turn.cos() > 0.0, "{lon}: {turn}");
         }
+    }
+
+    #[test]
+    fn systems_of_another_body_are_told_by_name() {
+        for (code, planet, expected) in [
+            (
+                "IAU_2015:30135",
+                Planet::MARS,
+                "found \"IAU_2015:30135\" (Moon (2015) - Sphere / Ocentric / South Polar, of 1737.4 km), \
+                 expected one of mars, of 3396.2 km",
+            ),
+            (
+                "EPSG:32633",
+                Planet::MOON,
+                "found \"EPSG:32633\" (WGS 84 / UTM zone 33N, of 6378.1 km), expected one of moon, of \
+                 1737.4 km",
+            ),
+            (
+                "IAU_2015:49910",
+                Planet::EARTH,
+                "found \"IAU_2015:49910\" (Mars (2015) - Sphere / Ocentric / Equirectangular, clon = 0, of \
+                 3396.2 km), expected one of earth, of 6378.1 km",
+            ),
+        ] {
+            assert_eq!(Crs::new(code, planet).unwrap_err().to_string(), expected);
+        }
+        // Old datums and the spheres of old maps are of the body all the same.
+        for code in ["EPSG:4267", "+proj=sinu +R=6371007.181 +type=crs"] {
+            assert!(Crs::new(code, Planet::EARTH).is_ok());
+        }
+        assert!(Crs::new("+proj=stere +lat_0=90 +R=3376200 +type=crs", Planet::MARS).is_ok());
+    }
+
+    #[test]
+    fn maps_are_written_in_two_dimensions() {
+        for code in [
+            "EPSG:32633",
+            "EPSG:4326",
+            "EPSG:2193",
+            "+proj=laea +lat_0=50 +type=crs",
+        ] {
+            assert!(Crs::for_map(code, Planet::EARTH).is_ok(), "{code}");
+        }
+        for (code, name) in [
+            ("EPSG:4979", "WGS 84"),
+            ("EPSG:4978", "WGS 84"),
+            ("EPSG:5773", "EGM96 height"),
+            ("EPSG:32633+5773", "WGS 84 / UTM zone 33N + EGM96 height"),
+        ] {
+            assert_eq!(
+                Crs::for_map(code, Planet::EARTH).unwrap_err().to_string(),
+                format!(
+                    "found \"{code}\" ({name}), expected a map projection, or latitudes and eastward \
+                     longitudes, without heights"
+                )
+            );
+        }
+        let westward = Planet::named("IAU_2015:49901").unwrap();
+        assert!(Crs::for_map("IAU_2015:49901", westward).is_err());
     }
 
     #[test]

@@ -74,8 +74,12 @@ fn project(planet: Planet, place: Geodetic, format: Format) -> String {
         format,
         site: &site,
     };
-    let bytes = qgz(&project).unwrap();
-    assert_eq!(bytes, qgz(&project).unwrap());
+    unpacked(&project)
+}
+
+fn unpacked(project: &Project<'_>) -> String {
+    let bytes = qgz(project).unwrap();
+    assert_eq!(bytes, qgz(project).unwrap());
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
     assert_eq!(archive.len(), 1);
     let mut text = String::new();
@@ -115,4 +119,29 @@ fn other_planets_and_poles_are_shown_about_their_own_site() {
     let moon = project(Planet::MOON, pole, Format::GeoPackage);
     assert!(moon.contains("Sphere / Ocentric, about the site"));
     assert!(moon.contains("<authid>IAU_2015:30100</authid>") && !moon.contains("WGS"));
+}
+
+/// Layers of another system than the planet's own say so, and the project opens where they are.
+#[test]
+fn layers_on_a_map_name_its_system() {
+    let karlsruhe = Geodetic::from_degrees(49.0, 8.4, 0.0);
+    let crs = crate::frame::Crs::for_map("EPSG:25833", Planet::EARTH).unwrap();
+    let layer = rocks(Planet::EARTH, &[("rock", None)]);
+    let layers = [layer.on_map(&crs).unwrap()];
+    let site = Site::new(Planet::EARTH, karlsruhe);
+    let project = Project {
+        title: "A",
+        layers: &layers,
+        format: Format::GeoPackage,
+        site: &site,
+    };
+    let text = unpacked(&project);
+    assert!(
+        text.contains("<srid>25833</srid>\n<authid>EPSG:25833</authid>"),
+        "{text}"
+    );
+    assert!(!text.contains("EPSG:4326"));
+    assert!(text.contains("<geographicflag>false</geographicflag>"));
+    // The extent is in UTM zone 32, about the place.
+    assert!(text.contains("<xmin>456114.096</xmin>"), "{text}");
 }
