@@ -16,7 +16,7 @@ use crate::error::{Error, Fault, Place};
 use crate::frame::{DatumError, Geodetic, Site, VerticalDatum};
 use crate::input::{Reason, Reject};
 use crate::pose::{PoseFile, read_poses};
-use crate::terrain::Terrain;
+use crate::terrain::{Terrain, datum_of_grid, vertical_datum};
 use crate::view::{self, ImageFile, Sources, View, read_images};
 
 /// Everything a run starts from.
@@ -219,8 +219,8 @@ fn first_place(poses: &[Read<PoseFile>]) -> Option<Geodetic> {
 fn datum(config: &Config, poses: &[Read<PoseFile>], faults: &mut Faults) -> Option<VerticalDatum> {
     let around = config.site.origin.or_else(|| first_place(poses))?;
     let datum = match config.site.height.as_ref()? {
-        Heights::Crs(code) => VerticalDatum::new(code, config.site.planet, around),
-        Heights::Grid(grid) => VerticalDatum::from_grid(&grid.path, &grid.shown, around),
+        Heights::Crs(code) => vertical_datum(code, config.site.planet, around),
+        Heights::Grid(grid) => datum_of_grid(&grid.path, &grid.shown, config.site.planet, around),
     };
     let told = |error: &_| Fault::new(Place::default(), "site.height", format!("{error}"));
     datum

@@ -19,6 +19,7 @@
 mod ascii;
 mod cell;
 mod constant;
+mod geoid;
 mod geotiff;
 mod grid;
 mod holes;
@@ -39,6 +40,7 @@ mod tests;
 use crate::frame::{CrsError, Direction, Enu, GeoidGrid, Point, Ray, Site};
 
 pub use ascii::read_ascii_grid;
+pub use geoid::{datum_of_grid, vertical_datum};
 pub use geotiff::{read_geotiff, write_geotiff};
 pub use grid::{Affine, GridError, HeightGrid, HeightsAbove, Posts};
 pub use open::read_heights;

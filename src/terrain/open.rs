@@ -9,7 +9,7 @@ use super::ascii::{is_ascii_grid, read_ascii_grid};
 use super::grid::{HeightGrid, HeightsAbove, Posts};
 use super::planetary::{is_pds3, is_pds4, is_vicar, read_pds3, read_pds4, read_vicar};
 use super::tile::within_reach;
-use super::{Shape, Terrain, read_geotiff};
+use super::{Shape, Terrain, read_geotiff, vertical_datum};
 use crate::error::{Error, Fault, Place};
 use crate::frame::{Crs, DatumError, Geodetic, Point, Site, VerticalDatum};
 
@@ -113,7 +113,7 @@ fn above_ellipsoid(
         }
         (HeightsAbove::Unsaid, Some(datum)) => datum,
         (HeightsAbove::Datum(code), _) => {
-            named = VerticalDatum::new(code, site.planet(), site.origin())
+            named = vertical_datum(code, site.planet(), site.origin())
                 .map_err(|error| Fault::new(place.clone(), "VerticalGeoKey", error.to_string()))?;
             &named
         }
