@@ -163,7 +163,7 @@ impl BrownConrady {
     }
 
     /// The tangential and prism terms at a place, and their derivative.
-    #[inline]
+    #[inline(always)]
     fn decentring(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let [p1, p2] = self.tangential;
         let (x, y) = (place.x, place.y);

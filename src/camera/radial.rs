@@ -105,15 +105,16 @@ impl Radial {
     }
 
     /// `N / D` and its derivative by `s = r^2`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn factor(&self, s: f64) -> (f64, f64) {
         let (n, n_slope) = evaluate(&self.numerator, s);
         if self.polynomial {
             return (n, n_slope);
         }
         let (d, d_slope) = evaluate(&self.denominator, s);
-        let factor = n / d;
-        (factor, (n_slope - factor * d_slope) / d)
+        let inverse = 1.0 / d;
+        let factor = n * inverse;
+        (factor, (n_slope - factor * d_slope) * inverse)
     }
 
     /// The distorted place of a place.

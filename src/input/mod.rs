@@ -5,6 +5,7 @@
 //! report a fault in the same words.
 
 mod asked;
+mod builder;
 mod document;
 mod head;
 mod json;
