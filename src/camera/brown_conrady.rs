@@ -165,19 +165,12 @@ impl BrownConrady {
     /// The tangential and prism terms at a place, and their derivative.
     #[inline(always)]
     fn decentring(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
-        if self.has_prism {
-            self.decentring_of::<true>(place)
-        } else {
-            self.decentring_of::<false>(place)
-        }
+        self.decentring_if(self.has_prism, place)
     }
 
-    /// The same, with prism terms or without.
+    /// The same, with prism terms or without: a constant, where many places are taken side by side.
     #[inline(always)]
-    fn decentring_of<const PRISM: bool>(
-        &self,
-        place: Vector2<f64>,
-    ) -> (Vector2<f64>, Matrix2<f64>) {
+    fn decentring_if(&self, prism: bool, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let [p1, p2] = self.tangential;
         let (x, y) = (place.x, place.y);
         let s = place.norm_squared();
@@ -190,7 +183,7 @@ impl BrownConrady {
             mixed,
             2.0 * half + 4.0 * p1 * y,
         );
-        if PRISM {
+        if prism {
             let [s1, s2, s3, s4] = self.prism;
             shift += Vector2::new(s * (s1 + s2 * s), s * (s3 + s4 * s));
             let prism = Vector2::new(2.0 * (s1 + 2.0 * s2 * s), 2.0 * (s3 + 2.0 * s4 * s));
@@ -241,7 +234,7 @@ impl BrownConrady {
         for _ in 0..2 {
             let mut radial = *distorted;
             for i in 0..N {
-                let shift = self.decentring_of::<PRISM>(near.get(i)).0;
+                let shift = self.decentring_if(PRISM, near.get(i)).0;
                 radial.set(i, distorted.get(i) - shift);
             }
             near = self.radial.undistort_roughly(&radial);
@@ -305,7 +298,7 @@ impl BrownConrady {
         place: Vector2<f64>,
     ) -> (Vector2<f64>, Matrix2<f64>) {
         let (distorted, jacobian) = self.radial.distort_unbounded_of::<POLYNOMIAL>(place);
-        let (shift, bend) = self.decentring_of::<PRISM>(place);
+        let (shift, bend) = self.decentring_if(PRISM, place);
         (distorted + shift, jacobian + bend)
     }
 

@@ -107,11 +107,7 @@ impl Radial {
     /// `N / D` and its derivative by `s = r^2`.
     #[inline(always)]
     pub(super) fn factor(&self, s: f64) -> (f64, f64) {
-        if self.polynomial {
-            self.factor_of::<true>(s)
-        } else {
-            self.factor_of::<false>(s)
-        }
+        self.factor_if(self.polynomial, s)
     }
 
     /// Whether the denominator is one everywhere.
@@ -123,9 +119,14 @@ impl Radial {
     /// As [`Radial::factor`], by what [`Radial::is_polynomial`] says: asked once for many places, it is out
     /// of the way of processors that take several side by side.
     #[inline(always)]
-    pub(super) fn factor_of<const POLYNOMIAL: bool>(&self, s: f64) -> (f64, f64) {
+    fn factor_of<const POLYNOMIAL: bool>(&self, s: f64) -> (f64, f64) {
+        self.factor_if(POLYNOMIAL, s)
+    }
+
+    #[inline(always)]
+    fn factor_if(&self, polynomial: bool, s: f64) -> (f64, f64) {
         let (n, n_slope) = evaluate(&self.numerator, s);
-        if POLYNOMIAL {
+        if polynomial {
             return (n, n_slope);
         }
         let (d, d_slope) = evaluate(&self.denominator, s);
@@ -163,11 +164,8 @@ impl Radial {
     /// As [`Radial::distort_with_jacobian`], within the radius of use or not.
     #[inline(always)]
     fn distort_unbounded(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
-        if self.polynomial {
-            self.distort_unbounded_of::<true>(place)
-        } else {
-            self.distort_unbounded_of::<false>(place)
-        }
+        let (factor, slope) = self.factor(place.norm_squared());
+        (place * factor, scaling_jacobian(place, factor, slope))
     }
 
     /// The same by what [`Radial::is_polynomial`] says.
