@@ -363,7 +363,7 @@ fn norths_heights_and_bodies_that_do_not_serve() {
         &["site.height=\"EPSG:32632\""],
         &[
             "error: --set: site.height: found \"EPSG:32632\", expected a vertical coordinate reference \
-             system known to PROJ, such as EPSG:5773, or a geoid grid in GTX format (not a vertical \
+             system known to PROJ, such as EPSG:5773, or a geoid grid in GTX or GeoTIFF format (not a vertical \
              one)",
         ],
     );

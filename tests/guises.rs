@@ -384,6 +384,13 @@ fn gtx(around: Geodetic) -> Vec<u8> {
     bytes
 }
 
+/// The same undulations around 49 degrees north, 8.4 degrees east, from the north on.
+fn geotiff_geoid() -> HeightGrid {
+    let posts = (0u8..5).flat_map(|row| [42.0 - 0.5 * f32::from(row); 5]);
+    let map = Affine::north_up(6.0, 51.0, 1.0);
+    HeightGrid::new(5, 5, Posts::F32(posts.collect()), map, "EPSG:4326").unwrap()
+}
+
 fn rocks(home: &Path) -> (Vec<[f64; 3]>, Value) {
     let text = fs::read_to_string(home.join("out/rocks.geojson")).unwrap();
     let layer: Value = serde_json::from_str(&text).unwrap();
@@ -540,26 +547,33 @@ fn a_geoid_by_its_code() {
         error.contains(&empty.path().display().to_string()),
         "{error}"
     );
-    let grids = tempfile::tempdir().unwrap();
-    fs::write(grids.path().join("egm96_15.gtx"), gtx(origin)).unwrap();
-    let output = run(grids.path());
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    let manifest = fs::read_to_string(home.path().join("out/run.json")).unwrap();
-    let manifest: Value = serde_json::from_str(&manifest).unwrap();
-    assert_eq!(manifest["site"]["heights"], "EPSG:5773");
-    // 41 m at 49 degrees: the origin's ellipsoidal height.
-    let height = manifest["site"]["origin"]["height_m"].as_f64().unwrap();
-    assert!((height - 115.0 - 41.0).abs() < 1e-3, "{height}");
-    let inputs = manifest["inputs"].as_array().unwrap();
-    assert!(
-        inputs.iter().any(|file| file["kind"] == "geoid"),
-        "{inputs:?}"
-    );
-    // Heights of the map are above the geoid again.
-    let (found, _) = rocks(home.path());
-    assert!(
-        found.iter().all(|rock| (114.0..116.0).contains(&rock[2])),
-        "{found:?}"
-    );
+    for name in ["egm96_15.gtx", "us_nga_egm96_15.tif"] {
+        let grids = tempfile::tempdir().unwrap();
+        let path = grids.path().join(name);
+        if name.ends_with("gtx") {
+            fs::write(path, gtx(origin)).unwrap();
+        } else {
+            write_geotiff(&path, &geotiff_geoid(), Planet::EARTH).unwrap();
+        }
+        let output = run(grids.path());
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        let manifest = fs::read_to_string(home.path().join("out/run.json")).unwrap();
+        let manifest: Value = serde_json::from_str(&manifest).unwrap();
+        assert_eq!(manifest["site"]["heights"], "EPSG:5773");
+        // 41 m at 49 degrees: the origin's ellipsoidal height.
+        let height = manifest["site"]["origin"]["height_m"].as_f64().unwrap();
+        assert!((height - 115.0 - 41.0).abs() < 1e-3, "{height}");
+        let inputs = manifest["inputs"].as_array().unwrap();
+        assert!(
+            inputs.iter().any(|file| file["kind"] == "geoid"),
+            "{inputs:?}"
+        );
+        // Heights of the map are above the geoid again.
+        let (found, _) = rocks(home.path());
+        assert!(
+            found.iter().all(|rock| (114.0..116.0).contains(&rock[2])),
+            "{found:?}"
+        );
+    }
 }

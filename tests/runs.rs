@@ -216,6 +216,52 @@ fn the_manifest_lists_what_was_written() {
     );
 }
 
+/// `output.crs` moves every format but GeoJSON, and changes nothing else of the map.
+#[test]
+fn a_map_in_another_system_is_the_same_map() {
+    let set = ["output.annotate=false", "output.report=false", ALL_FORMATS];
+    let plain = Run::of("fixtures/tiny/pipeline.toml", None, &set);
+    let utm = [&set[..], &["output.crs=\"EPSG:32719\""]].concat();
+    let run = Run::of("fixtures/tiny/pipeline.toml", None, &utm);
+    assert_eq!(
+        run.json("run.json")["config"]["output"]["crs"],
+        "EPSG:32719"
+    );
+    let features = |run: &Run| run.json("rocks.geojson")["features"].clone();
+    let places = |run: &Run| -> Vec<Value> {
+        let all = features(run);
+        all.as_array()
+            .unwrap()
+            .iter()
+            .map(|f| f["geometry"].clone())
+            .collect()
+    };
+    assert_eq!(places(&run), places(&plain));
+    let table = fs::read_to_string(run.out().join("rocks.csv")).unwrap();
+    assert!(
+        table.starts_with("easting_m,northing_m,rock_id,class,"),
+        "{table}"
+    );
+    let crs = rockmap::frame::Crs::new("EPSG:32719", rockmap::frame::Planet::EARTH).unwrap();
+    for (row, place) in table.lines().skip(1).zip(places(&run)) {
+        let number = |i: usize| row.split(',').nth(i).unwrap().parse::<f64>().unwrap();
+        let (lon, lat) = crs.lon_lat(number(0), number(1)).unwrap();
+        let at = |i: usize| place["coordinates"][i].as_f64().unwrap();
+        assert!(
+            (lon.to_degrees() - at(0)).hypot(lat.to_degrees() - at(1)) < 2e-9,
+            "{row}"
+        );
+    }
+    let db = rusqlite::Connection::open(run.out().join("rockmap.gpkg")).unwrap();
+    let sql = "SELECT group_concat(DISTINCT srs_id) FROM gpkg_geometry_columns";
+    let systems: String = db.query_row(sql, [], |row| row.get(0)).unwrap();
+    assert_eq!(systems, "32719");
+    let item = run.json("stac.json");
+    assert_eq!(item["properties"]["proj:code"], "EPSG:4326");
+    assert_eq!(item["assets"]["rockmap.gpkg"]["proj:code"], "EPSG:32719");
+    assert_eq!(item["assets"]["rocks.geojson"]["proj:code"], Value::Null);
+}
+
 #[test]
 fn an_empty_night_gives_every_layer_with_its_columns_and_system() {
     let nothing = ["view.min_score=1.0", "output.annotate=false", ALL_FORMATS];

@@ -163,8 +163,14 @@ impl BrownConrady {
     }
 
     /// The tangential and prism terms at a place, and their derivative.
-    #[inline]
+    #[inline(always)]
     fn decentring(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        self.decentring_if(self.has_prism, place)
+    }
+
+    /// The same, with prism terms or without: a constant, where many places are taken side by side.
+    #[inline(always)]
+    fn decentring_if(&self, prism: bool, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let [p1, p2] = self.tangential;
         let (x, y) = (place.x, place.y);
         let s = place.norm_squared();
@@ -177,7 +183,7 @@ impl BrownConrady {
             mixed,
             2.0 * half + 4.0 * p1 * y,
         );
-        if self.has_prism {
+        if prism {
             let [s1, s2, s3, s4] = self.prism;
             shift += Vector2::new(s * (s1 + s2 * s), s * (s3 + s4 * s));
             let prism = Vector2::new(2.0 * (s1 + 2.0 * s2 * s), 2.0 * (s3 + 2.0 * s4 * s));
@@ -208,35 +214,75 @@ impl BrownConrady {
     /// does not suffice.
     #[inline(always)]
     fn undistort_nearby<const N: usize>(&self, distorted: &Places<N>) -> Places<N> {
+        // What a lens is made of is asked once for all lanes: in the loops over them it would keep
+        // the compiler from taking several side by side.
+        match (self.has_prism, self.radial.is_polynomial()) {
+            (false, false) => self.undistort_nearby_of::<N, false, false>(distorted),
+            (false, true) => self.undistort_nearby_of::<N, false, true>(distorted),
+            (true, false) => self.undistort_nearby_of::<N, true, false>(distorted),
+            (true, true) => self.undistort_nearby_of::<N, true, true>(distorted),
+        }
+    }
+
+    /// The same, with prism terms or without, with a denominator or without.
+    #[inline(always)]
+    fn undistort_nearby_of<const N: usize, const PRISM: bool, const POLYNOMIAL: bool>(
+        &self,
+        distorted: &Places<N>,
+    ) -> Places<N> {
         let mut near = self.radial.undistort_roughly(distorted);
         for _ in 0..2 {
-            let radial = Places::from_fn(|i| distorted.get(i) - self.decentring(near.get(i)).0);
+            let mut radial = *distorted;
+            for i in 0..N {
+                let shift = self.decentring_if(PRISM, near.get(i)).0;
+                radial.set(i, distorted.get(i) - shift);
+            }
             near = self.radial.undistort_roughly(&radial);
         }
         let mut settled = [false; N];
-        near = Places::from_fn(|i| {
-            let (place, is_settled) = self.polished(near.get(i), distorted.get(i));
-            settled[i] = is_settled;
-            place
-        });
-        // Strong decentring takes another two steps.
+        // A loop, not a closure, which the compiler may leave out of line.
+        for (i, settled) in settled.iter_mut().enumerate() {
+            let (place, is_settled) =
+                self.polished::<PRISM, POLYNOMIAL>(near.get(i), distorted.get(i));
+            near.set(i, place);
+            *settled = is_settled;
+        }
         for (i, _) in settled.iter().enumerate().filter(|(_, s)| !**s) {
-            let (place, is_settled) = self.polished(near.get(i), distorted.get(i));
-            let nowhere = Vector2::repeat(f64::NAN);
-            near.set(i, if is_settled { place } else { nowhere });
+            near.set(i, self.polished_again(near.get(i), distorted.get(i)));
         }
         near
     }
 
+    /// Another two steps, which strong decentring takes; not numbers where these do not suffice either.
+    #[inline(never)]
+    fn polished_again(&self, near: Vector2<f64>, distorted: Vector2<f64>) -> Vector2<f64> {
+        let (place, is_settled) = match (self.has_prism, self.radial.is_polynomial()) {
+            (false, false) => self.polished::<false, false>(near, distorted),
+            (false, true) => self.polished::<false, true>(near, distorted),
+            (true, false) => self.polished::<true, false>(near, distorted),
+            (true, true) => self.polished::<true, true>(near, distorted),
+        };
+        if is_settled {
+            place
+        } else {
+            Vector2::repeat(f64::NAN)
+        }
+    }
+
     /// Two steps of Newton's method with one derivative, and whether these suffice.
     #[inline(always)]
-    fn polished(&self, near: Vector2<f64>, distorted: Vector2<f64>) -> (Vector2<f64>, bool) {
-        let (seen, jacobian) = self.distort_unbounded(near);
+    fn polished<const PRISM: bool, const POLYNOMIAL: bool>(
+        &self,
+        near: Vector2<f64>,
+        distorted: Vector2<f64>,
+    ) -> (Vector2<f64>, bool) {
+        let (seen, jacobian) = self.distort_unbounded::<PRISM, POLYNOMIAL>(near);
         let determinant = determinant(&jacobian);
         let inverse = adjugate(&jacobian) * (1.0 / determinant);
         let first = product(&inverse, &(distorted - seen));
         let place = near + first;
-        let second = product(&inverse, &(distorted - self.distort_unbounded(place).0));
+        let (seen, _) = self.distort_unbounded::<PRISM, POLYNOMIAL>(place);
+        let second = product(&inverse, &(distorted - seen));
         // What is left is of the order of the product of the two; a hundred covers the curvature.
         let left = 1e4 * first.norm_squared() * second.norm_squared() * norm_squared(&inverse);
         let small = left <= f64::EPSILON * f64::EPSILON;
@@ -247,9 +293,12 @@ impl BrownConrady {
 
     /// As [`Self::distort`], in the field or not.
     #[inline(always)]
-    fn distort_unbounded(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
-        let (distorted, jacobian) = self.radial.distort_unbounded(place);
-        let (shift, bend) = self.decentring(place);
+    fn distort_unbounded<const PRISM: bool, const POLYNOMIAL: bool>(
+        &self,
+        place: Vector2<f64>,
+    ) -> (Vector2<f64>, Matrix2<f64>) {
+        let (distorted, jacobian) = self.radial.distort_unbounded_of::<POLYNOMIAL>(place);
+        let (shift, bend) = self.decentring_if(PRISM, place);
         (distorted + shift, jacobian + bend)
     }
 

@@ -25,6 +25,7 @@ mod polynomial;
 mod radial;
 mod read;
 mod read_readout;
+mod read_vectors;
 mod readout;
 mod sensor;
 mod write;

@@ -32,7 +32,7 @@ pub(super) fn plane_by_point(plane: Vector2<f64>, z: f64) -> Matrix2x3<f64> {
 }
 
 /// The unit direction to a place on the plane z = 1.
-#[inline]
+#[inline(always)]
 pub(super) fn direction_of_plane(plane: Vector2<f64>) -> Vector3<f64> {
     let inverse = 1.0 / (1.0 + plane.norm_squared()).sqrt();
     Vector3::new(plane.x * inverse, plane.y * inverse, inverse)

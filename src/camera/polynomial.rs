@@ -1,10 +1,10 @@
 //! Polynomials of one variable, by their coefficients from the constant term upwards.
 
 /// The value and the derivative at `x`.
-#[inline]
+#[inline(always)]
 pub(super) fn evaluate<const N: usize>(coefficients: &[f64; N], x: f64) -> (f64, f64) {
-    let (mut value, mut slope) = (0.0, 0.0);
-    for i in (0..N).rev() {
+    let (mut value, mut slope) = (coefficients[N - 1], 0.0);
+    for i in (0..N - 1).rev() {
         slope = slope * x + value;
         value = value * x + coefficients[i];
     }

@@ -105,15 +105,34 @@ impl Radial {
     }
 
     /// `N / D` and its derivative by `s = r^2`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn factor(&self, s: f64) -> (f64, f64) {
+        self.factor_if(self.polynomial, s)
+    }
+
+    /// Whether the denominator is one everywhere.
+    #[inline]
+    pub(super) fn is_polynomial(&self) -> bool {
+        self.polynomial
+    }
+
+    /// As [`Radial::factor`], by what [`Radial::is_polynomial`] says: asked once for many places, it is out
+    /// of the way of processors that take several side by side.
+    #[inline(always)]
+    fn factor_of<const POLYNOMIAL: bool>(&self, s: f64) -> (f64, f64) {
+        self.factor_if(POLYNOMIAL, s)
+    }
+
+    #[inline(always)]
+    fn factor_if(&self, polynomial: bool, s: f64) -> (f64, f64) {
         let (n, n_slope) = evaluate(&self.numerator, s);
-        if self.polynomial {
+        if polynomial {
             return (n, n_slope);
         }
         let (d, d_slope) = evaluate(&self.denominator, s);
-        let factor = n / d;
-        (factor, (n_slope - factor * d_slope) / d)
+        let inverse = 1.0 / d;
+        let factor = n * inverse;
+        (factor, (n_slope - factor * d_slope) * inverse)
     }
 
     /// The distorted place of a place.
@@ -144,8 +163,18 @@ impl Radial {
 
     /// As [`Radial::distort_with_jacobian`], within the radius of use or not.
     #[inline(always)]
-    pub(super) fn distort_unbounded(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+    fn distort_unbounded(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let (factor, slope) = self.factor(place.norm_squared());
+        (place * factor, scaling_jacobian(place, factor, slope))
+    }
+
+    /// The same by what [`Radial::is_polynomial`] says.
+    #[inline(always)]
+    pub(super) fn distort_unbounded_of<const POLYNOMIAL: bool>(
+        &self,
+        place: Vector2<f64>,
+    ) -> (Vector2<f64>, Matrix2<f64>) {
+        let (factor, slope) = self.factor_of::<POLYNOMIAL>(place.norm_squared());
         (place * factor, scaling_jacobian(place, factor, slope))
     }
 

@@ -1,9 +1,10 @@
 //! Reads cameras.toml.
 
 use super::read_readout::readout;
+use super::read_vectors::cahv_family;
 use super::{
-    BadLens, BodyAxes, BrownConrady, Cahv, CahvVectors, Cahvor, Cahvore, Camera, Cameras,
-    Equirectangular, Fisheye, Intrinsics, Lens, Linearity, Mount, Pinhole,
+    BadLens, BrownConrady, Camera, Cameras, Equirectangular, Fisheye, Intrinsics, Lens, Mount,
+    Pinhole,
 };
 use crate::error::Error;
 use crate::frame::{Point, Vector};
@@ -107,12 +108,12 @@ pub(super) fn side(section: &Section, key: &str) -> Option<u32> {
     u32::try_from(side).ok()
 }
 
-fn required_triple(section: &Section, key: &str) -> Option<[f64; 3]> {
+pub(super) fn required_triple(section: &Section, key: &str) -> Option<[f64; 3]> {
     required(section, key, THREE, |s, key| s.triple(key))
 }
 
 /// The lens, or the fault that its parameters make none.
-fn made<T>(section: &Section, key: &str, lens: Result<T, BadLens>) -> Option<T> {
+pub(super) fn lens_made<T>(section: &Section, key: &str, lens: Result<T, BadLens>) -> Option<T> {
     lens.map_err(|bad| section.problem(key, bad.to_string()))
         .ok()
 }
@@ -128,7 +129,7 @@ fn lens(section: &Section, model: &str, width: Option<u32>, height: Option<u32>)
             let meant = "a pinhole camera has no distortion, is model = \"brown_conrady\" meant?";
             section.problem("distortion", meant);
         }
-        return made(section, "", Pinhole::new(intrinsics?)).map(Lens::Pinhole);
+        return lens_made(section, "", Pinhole::new(intrinsics?)).map(Lens::Pinhole);
     }
     let counts: &[usize] = if model == "fisheye" {
         &[4]
@@ -142,10 +143,10 @@ fn lens(section: &Section, model: &str, width: Option<u32>, height: Option<u32>)
     let intrinsics = intrinsics?;
     if model == "fisheye" {
         let lens = Fisheye::new(intrinsics, distortion.try_into().ok()?);
-        return made(section, "distortion", lens).map(Lens::Fisheye);
+        return lens_made(section, "distortion", lens).map(Lens::Fisheye);
     }
     let lens = BrownConrady::new(intrinsics, &distortion);
-    made(section, "distortion", lens).map(Lens::BrownConrady)
+    lens_made(section, "distortion", lens).map(Lens::BrownConrady)
 }
 
 fn intrinsics(section: &Section) -> Option<Intrinsics> {
@@ -212,74 +213,6 @@ fn with_pivot(mount: Mount, pivot: Option<[f64; 3]>) -> Mount {
         Some([x, y, z]) => mount.with_pivot(Point::new(x, y, z)),
         None => mount,
     }
-}
-
-/// A lens by JPL's vectors, which place the camera too.
-fn cahv_family(section: &Section, model: &str) -> Option<(Lens, Mount)> {
-    let axes = required(section, "axes", "\"flu\" or \"frd\"", |s, key| {
-        s.word(key, &["flu", "frd"])
-    });
-    let [c, a, h, v] = ["C", "A", "H", "V"].map(|key| required_triple(section, key));
-    let distorted = model != "cahv";
-    let o = distorted.then(|| required_triple(section, "O")).flatten();
-    let r = distorted.then(|| required_triple(section, "R")).flatten();
-    let moving = model == "cahvore";
-    let e = moving.then(|| required_triple(section, "E")).flatten();
-    let linearity = linearity(section, moving);
-    let vectors = CahvVectors {
-        axes: if axes? == "frd" {
-            BodyAxes::Frd
-        } else {
-            BodyAxes::Flu
-        },
-        centre: c?,
-        axis: a?,
-        horizontal: h?,
-        vertical: v?,
-    };
-    if moving {
-        let lens = made(section, "", Cahvore::new(vectors, o?, r?, e?, linearity?))?;
-        let mount = lens.linear().mount();
-        return Some((Lens::Cahvore(lens), mount));
-    }
-    if distorted {
-        let lens = made(section, "", Cahvor::new(vectors, o?, r?))?;
-        let mount = lens.linear().mount();
-        return Some((Lens::Cahvor(lens), mount));
-    }
-    let lens = made(section, "", Cahv::new(vectors))?;
-    let mount = lens.mount();
-    Some((Lens::Cahv(lens), mount))
-}
-
-/// `mtype` and `linearity`. Records of CAHV and CAHVOR cameras carry them as well and mean nothing
-/// by them; records of the types 1 and 2 often leave the linearity at zero.
-fn linearity(section: &Section, moving: bool) -> Option<Linearity> {
-    let mtype = if moving {
-        required(section, "mtype", "1, 2 or 3", |s, key| {
-            s.integer(key, 1..=3)
-        })
-    } else {
-        section.integer("mtype", 1..=3)
-    };
-    let given = section.number("linearity", .., "a finite number");
-    let linearity = match mtype? {
-        1 => Linearity::Perspective,
-        2 => Linearity::Fisheye,
-        _ if moving => {
-            Linearity::General(required(section, "linearity", "a number", |_, _| given)?)
-        }
-        _ => return None,
-    };
-    if let (true, Some(given), Linearity::Perspective | Linearity::Fisheye) =
-        (moving, given, linearity)
-        && given != 0.0
-        && given != linearity.value()
-    {
-        let expected = format!("{} (mtype = 3 takes any)", linearity.value());
-        section.fault("linearity", given, expected);
-    }
-    Some(linearity)
 }
 
 #[cfg(test)]

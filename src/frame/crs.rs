@@ -47,6 +47,33 @@ pub enum CrsError {
         /// What PROJ said.
         why: String,
     },
+    /// A system of another body.
+    #[error(
+        "found {found:?} ({own}, of {radius_km:.1} km), expected one of {body}, of {body_km:.1} km"
+    )]
+    OtherBody {
+        /// What was given.
+        found: String,
+        /// Its name.
+        own: String,
+        /// The radius of its body's equator, kilometres.
+        radius_km: f64,
+        /// The body it is to be of.
+        body: &'static str,
+        /// The radius of that body's equator, kilometres.
+        body_km: f64,
+    },
+    /// Not one that places of a map are written in.
+    #[error(
+        "found {found:?} ({own}), expected a map projection, or latitudes and eastward longitudes, \
+         without heights"
+    )]
+    NotHorizontal {
+        /// What was given.
+        found: String,
+        /// Its name.
+        own: String,
+    },
     /// A place outside the CRS's domain.
     #[error("({x}, {y}) lies outside the domain of {crs}")]
     OutsideDomain {
@@ -70,6 +97,17 @@ impl Crs {
     /// [`CrsError::Unknown`] where PROJ cannot relate it to the planet's geographic CRS.
     pub fn new(definition: &str, planet: Planet) -> Result<Self, CrsError> {
         let parts = Definition::of(definition)?;
+        if let Some(own) = parts.ellipsoid()
+            && !is_of_size(own, planet.ellipsoid)
+        {
+            return Err(CrsError::OtherBody {
+                found: definition.to_owned(),
+                own: parts.name().to_owned(),
+                radius_km: own.a / 1000.0,
+                body: planet.name,
+                body_km: planet.ellipsoid.a / 1000.0,
+            });
+        }
         // On other bodies maps on a sphere and on an ellipsoid stand side by side, and PROJ takes the
         // latitude of the one for that of the other. On Earth it knows the ways between datums.
         let flattening = parts.ellipsoid().map(|ellipsoid| ellipsoid.f);
@@ -100,6 +138,22 @@ impl Crs {
         };
         crs.converter()?;
         Ok(crs)
+    }
+
+    /// The system of a definition, where places of a map can be written in it: two-dimensional, either
+    /// projected or with latitudes and eastward longitudes.
+    ///
+    /// # Errors
+    /// As [`Crs::new`], and [`CrsError::NotHorizontal`].
+    pub fn for_map(definition: &str, planet: Planet) -> Result<Self, CrsError> {
+        let parts = Definition::of(definition)?;
+        if !parts.is_horizontal() || (parts.is_geodetic() && parts.is_west_positive()) {
+            return Err(CrsError::NotHorizontal {
+                found: definition.to_owned(),
+                own: parts.name().to_owned(),
+            });
+        }
+        Self::new(definition, planet)
     }
 
     /// Whether a definition is one that PROJ understands, on whatever planet.
@@ -230,86 +284,18 @@ fn geodetic_latitude(lat: f64, from: f64, to: f64) -> f64 {
     (sin * (1.0 - from).powi(2)).atan2(cos * (1.0 - to).powi(2))
 }
 
+/// Whether an ellipsoid is of a body's size: datums of one body differ by less than a hundredth, and so do
+/// spheres of its equatorial and of its polar radius from either.
+fn is_of_size(own: Ellipsoid, body: Ellipsoid) -> bool {
+    let polar = body.a * (1.0 - body.f);
+    [body.a, polar]
+        .into_iter()
+        .any(|radius| (own.a / radius - 1.0).abs() < 0.01)
+}
+
 fn finite(x: f64, y: f64) -> Option<(f64, f64)> {
     (x.is_finite() && y.is_finite()).then_some((x, y))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Value by pyproj.
-    #[test]
-    fn utm_agrees_with_pyproj_both_ways() {
-        let utm = Crs::new("EPSG:32632", Planet::EARTH).unwrap();
-        let (lon, lat) = (8.4f64.to_radians(), 49f64.to_radians());
-        let (x, y) = utm.xy(lon, lat).unwrap();
-        assert!((x - 456_114.595_9).abs() < 1e-3 && (y - 5_427_629.203_9).abs() < 1e-3);
-        let (lon2, lat2) = utm.lon_lat(x, y).unwrap();
-        assert!((lon - lon2).abs() < 1e-12 && (lat - lat2).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_geographic_crs_gives_degrees() {
-        let crs = Crs::new("EPSG:4326", Planet::EARTH).unwrap();
-        let (x, y) = crs.xy(0.1, 0.2).unwrap();
-        assert!((x - 0.1f64.to_degrees()).abs() < 1e-9 && (y - 0.2f64.to_degrees()).abs() < 1e-9);
-    }
-
-    #[test]
-    fn mars_has_its_own() {
-        let crs = Crs::new("IAU_2015:49910", Planet::MARS).unwrap();
-        let (x, _) = crs.xy(0.01, 0.0).unwrap();
-        assert!((x - 33_961.9).abs() < 1e-3);
-    }
-
-    /// A map on a sphere has planetocentric latitudes, whatever the run's ellipsoid is.
-    #[test]
-    fn maps_on_a_sphere_and_on_an_ellipsoid_agree_on_places() {
-        let planet = Planet::named("IAU_2015:49901").unwrap();
-        let sphere = Crs::new("IAU_2015:49910", planet).unwrap();
-        let (lat_c, _) = Planet::named("IAU_2015:49902")
-            .unwrap()
-            .lat_lon_deg(planet.place(20.0, -77.0, 0.0));
-        let place = planet.place(20.0, -77.0, 0.0);
-        let (x, y) = sphere.xy(place.lon, place.lat).unwrap();
-        assert!((x - 77f64.to_radians() * 3_396_190.0).abs() < 1e-6);
-        assert!((y - lat_c.to_radians() * 3_396_190.0).abs() < 1e-6);
-        let (lon, lat) = sphere.lon_lat(x, y).unwrap();
-        assert!((lon - place.lon).abs() < 1e-14 && (lat - place.lat).abs() < 1e-14);
-    }
-
-    /// On a sphere `tan c = tan(lon) sin(lat)` (Snyder 1987, eq. 8-9).
-    #[test]
-    fn convergence_of_a_transverse_mercator() {
-        let crs = Crs::new("+proj=tmerc +R=3396190 +lon_0=10 +type=crs", Planet::MARS).unwrap();
-        for (lat, lon) in [(60.0, 12.5), (-35.0, 8.0), (0.0, 14.0), (80.0, 10.0)] {
-            let place = Geodetic::from_degrees(lat, lon, 0.0);
-            let expected = ((lon - 10.0).to_radians().tan() * place.lat.sin()).atan();
-            let found = crs.convergence(place).unwrap();
-            assert!(
-                (found - expected).abs() < 1e-8,
-                "{lat} {lon}: {found} {expected}"
-            );
-        }
-    }
-
-    /// On a polar map grid north is a longitude's distance from true north.
-    #[test]
-    fn convergence_near_a_pole() {
-        let crs = Crs::new("IAU_2015:30135", Planet::MOON).unwrap();
-        for lon in [-170.0, -90.0, 0.0, 30.0, 120.0] {
-            let place = Geodetic::from_degrees(-89.0, lon, 0.0);
-            let turn = crs.convergence(place).unwrap() + f64::to_radians(lon);
-            assert!(turn.sin().abs() < 1e-8 && turn.cos() > 0.0, "{lon}: {turn}");
-        }
-    }
-
-    #[test]
-    fn unknown_ones_are_named() {
-        let error = Crs::new("EPSG:999999", Planet::EARTH).unwrap_err();
-        assert!(error.to_string().starts_with(
-            "found \"EPSG:999999\", expected a coordinate reference system known to PROJ"
-        ));
-    }
-}
+mod tests;

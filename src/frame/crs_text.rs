@@ -19,7 +19,10 @@ pub struct CrsText {
     pub wkt2: String,
     /// Well-known text 2 as OGC 12-063r5 has it, on one line.
     pub wkt2_2015: String,
+    /// Whether it is a map whose axes both count metres.
+    pub is_in_metres: bool,
     ellipsoid: Option<Ellipsoid>,
+    projected_wkt1: Option<String>,
     /// PROJJSON.
     pub projjson: serde_json::Value,
 }
@@ -79,6 +82,9 @@ impl CrsText {
         // Without a version PROJ writes the newest it knows, WKT2:2019.
         let wkt2 = crs.as_wkt(None, None).map_err(unknown)?;
         let wkt2_2015 = crs.as_wkt(Some(WktVersion::Wkt2_2015), None);
+        let wkt1 = crs.as_wkt(Some(WktVersion::Wkt1_Gdal), None);
+        let projected_wkt1 = wkt1.ok().map(|wkt| one_line(&wkt));
+        let is_in_metres = parts.is_in_metres();
         let projjson = parts.into_json();
         Ok(Self {
             authority: String::new(),
@@ -86,14 +92,25 @@ impl CrsText {
             name: projjson["name"].as_str().unwrap_or(definition).to_owned(),
             wkt2: one_line(&wkt2),
             wkt2_2015: one_line(&wkt2_2015.map_err(unknown)?),
+            is_in_metres,
             ellipsoid,
+            projected_wkt1: projected_wkt1.filter(|wkt| wkt.starts_with("PROJCS[")),
             projjson,
         })
     }
 
-    /// Well-known text 1 (OGC 01-009), on one line, of a geographic one; `None` of others, and of
-    /// planetocentric latitudes on an ellipsoid, which it has no words for.
-    pub fn geographic_wkt1(&self) -> Option<String> {
+    /// Whether it is latitude and longitude, in degrees.
+    pub fn is_geographic(&self) -> bool {
+        self.projjson["type"] != "ProjectedCRS"
+    }
+
+    /// Well-known text 1 (OGC 01-009), on one line; `None` where it has no words for the system.
+    pub fn wkt1(&self) -> Option<String> {
+        self.geographic_wkt1().or(self.projected_wkt1.clone())
+    }
+
+    /// Well-known text 1 of a geographic one; `None` of others, and of planetocentric latitudes on an ellipsoid, which it has no words for.
+    fn geographic_wkt1(&self) -> Option<String> {
         let crs = &self.projjson;
         if crs["type"] != "GeographicCRS" {
             return None;
@@ -136,7 +153,7 @@ mod tests {
         for (code, radius) in [("IAU_2015:30100", "1737400"), ("IAU_2015:49900", "3396190")] {
             let text = CrsText::of(code).unwrap();
             assert_eq!(text.authority, "IAU_2015");
-            let wkt1 = text.geographic_wkt1().unwrap();
+            let wkt1 = text.wkt1().unwrap();
             assert!(wkt1.contains(&format!("Sphere\",{radius},0]]")), "{wkt1}");
             assert!(wkt1.ends_with(&format!("AUTHORITY[\"IAU_2015\",\"{}\"]]", text.code)));
             assert!(!wkt1.contains("WGS") && !text.wkt2.contains("WGS"));
@@ -151,6 +168,17 @@ mod tests {
         assert!(text.wkt2.starts_with("PROJCRS["), "{}", text.wkt2);
         assert_eq!(text.geographic_wkt1(), None);
         assert!(CrsText::of("EPSG:999999").is_err());
+        let utm = CrsText::of("EPSG:32633").unwrap();
+        let wkt1 = utm.wkt1().unwrap();
+        assert!(
+            wkt1.starts_with("PROJCS[\"WGS 84 / UTM zone 33N\",GEOGCS["),
+            "{wkt1}"
+        );
+        assert!(wkt1.ends_with("AUTHORITY[\"EPSG\",\"32633\"]]"), "{wkt1}");
+        assert!(utm.is_in_metres && !utm.is_geographic() && text.is_in_metres);
+        let feet = CrsText::of("EPSG:2277").unwrap();
+        assert!(!feet.is_in_metres && !feet.is_geographic());
+        assert!(CrsText::of("EPSG:4258").unwrap().is_geographic());
     }
 
     /// Longitudes of a map grow eastwards, and its system says so.
@@ -162,7 +190,7 @@ mod tests {
         assert_eq!(text.name, "Mars (2015) / Ographic, east positive");
         assert!(text.wkt2.contains(",east,") && !text.wkt2.contains(",west,"));
         assert!(!text.wkt2.contains("49901") && text.projjson.get("id").is_none());
-        let wkt1 = text.geographic_wkt1().unwrap();
+        let wkt1 = text.wkt1().unwrap();
         assert!(wkt1.contains("3396190,169.8944472236"), "{wkt1}");
         assert!(!wkt1.contains("AUTHORITY"));
         let mars = CrsText::of_map(Planet::MARS).unwrap();

@@ -103,6 +103,24 @@ impl Definition {
         axes.is_some_and(|axes| axes.iter().any(|axis| axis["direction"] == "west"))
     }
 
+    /// Its name.
+    pub fn name(&self) -> &str {
+        self.root["name"].as_str().unwrap_or("unknown")
+    }
+
+    /// Whether it gives places in two dimensions: a map projection, or latitude and longitude.
+    pub fn is_horizontal(&self) -> bool {
+        let is_kind = self.root["type"] == "ProjectedCRS" || self.root["type"] == "GeographicCRS";
+        let axes = self.root["coordinate_system"]["axis"].as_array();
+        is_kind && axes.is_some_and(|axes| axes.len() == 2)
+    }
+
+    /// Whether both axes count metres.
+    pub fn is_in_metres(&self) -> bool {
+        let axes = self.root["coordinate_system"]["axis"].as_array();
+        axes.is_some_and(|axes| axes.iter().all(|axis| unit(&axis["unit"]) == Some(1.0)))
+    }
+
     /// Its ellipsoid; `None` where the body is none of revolution.
     pub fn ellipsoid(&self) -> Option<Ellipsoid> {
         let mut crs = self.horizontal();

@@ -3,11 +3,9 @@
 use serde::de::IgnoredAny;
 
 use super::Document;
+use super::builder::Builder;
 use super::document::{Kind, Node};
 use crate::error::{Fault, Place};
-
-/// Deeper than any list of cameras or annotations nests.
-const DEEPEST: usize = 100;
 
 impl Document {
     /// Parses JSON. `shown` is the name faults call the file by. A key whose value is `null` counts
@@ -31,17 +29,16 @@ impl Document {
             text,
             shown,
             at: 0,
-            levels: DEEPEST,
             counted: 0,
             line: 1,
             column: 1,
         };
-        let kind = walk.value()?.map(|root| root.kind);
-        let root = Node {
-            place: Place::file(shown),
-            kind: kind.unwrap_or(Kind::Other("null".to_owned())),
-        };
-        Ok(Document::of(shown, root))
+        let mut builder = Builder::new(shown);
+        while let Some(first) = walk.peek() {
+            let place = walk.place();
+            walk.take(first, place, &mut builder)?;
+        }
+        Ok(Document::of(shown, builder.finish()))
     }
 }
 
@@ -50,8 +47,6 @@ struct Walk<'a> {
     text: &'a str,
     shown: &'a str,
     at: usize,
-    /// How many more levels may open.
-    levels: usize,
     /// Up to where lines and columns have been counted.
     counted: usize,
     line: u64,
@@ -76,73 +71,35 @@ impl Walk<'_> {
         }
     }
 
-    /// The next byte that says something.
-    fn peek(&mut self) -> u8 {
+    /// The next byte that says something; `None` at the end.
+    fn peek(&mut self) -> Option<u8> {
         let bytes = self.text.as_bytes();
         while let Some(b' ' | b'\t' | b'\r' | b'\n' | b',' | b':') = bytes.get(self.at) {
             self.at += 1;
         }
-        bytes.get(self.at).copied().unwrap_or(b']')
+        bytes.get(self.at).copied()
     }
 
-    /// The next value; `None` where it is `null`.
-    fn value(&mut self) -> Result<Option<Node>, Fault> {
-        let first = self.peek();
-        let place = self.place();
+    /// Takes what begins with this byte into the tree.
+    fn take(&mut self, first: u8, place: Place, tree: &mut Builder<'_>) -> Result<(), Fault> {
         let kind = match first {
-            b'{' | b'[' if self.levels == 0 => {
-                let expected = format!("at most {DEEPEST}");
-                return Err(Fault::found(place, "", "more levels than that", expected));
+            b'{' | b'[' | b'}' | b']' => {
+                self.at += 1;
+                return match first {
+                    b'{' => tree.begin(place, Kind::Table(Vec::new())),
+                    b'[' => tree.begin(place, Kind::List(Vec::new())),
+                    _ => tree.end(),
+                };
             }
-            b'{' => self.table()?,
-            b'[' => self.list()?,
             b'"' => Kind::Text(self.string()?),
             _ => match self.bare() {
                 "true" => Kind::Boolean(true),
                 "false" => Kind::Boolean(false),
-                "null" => return Ok(None),
+                "null" => Kind::Other("null".to_owned()),
                 number => Kind::Number(number.parse().unwrap_or(f64::NAN)),
             },
         };
-        Ok(Some(Node { place, kind }))
-    }
-
-    fn table(&mut self) -> Result<Kind, Fault> {
-        self.at += 1;
-        self.levels -= 1;
-        let mut entries: Vec<(String, Node)> = Vec::new();
-        while self.peek() != b'}' {
-            let place = self.place();
-            let key = self.string()?;
-            if entries.iter().any(|(k, _)| *k == key) {
-                return Err(Fault::found(place, key, "the key twice", "it once"));
-            }
-            if let Some(mut node) = self.value()? {
-                node.place = place;
-                entries.push((key, node));
-            }
-        }
-        self.at += 1;
-        self.levels += 1;
-        Ok(Kind::Table(entries))
-    }
-
-    fn list(&mut self) -> Result<Kind, Fault> {
-        self.at += 1;
-        self.levels -= 1;
-        let mut list = Vec::new();
-        while self.peek() != b']' {
-            let place = self.place();
-            let empty = || Node {
-                place,
-                kind: Kind::Other("null".to_owned()),
-            };
-            let value = self.value()?;
-            list.push(value.unwrap_or_else(empty));
-        }
-        self.at += 1;
-        self.levels += 1;
-        Ok(Kind::List(list))
+        tree.put(Node { place, kind })
     }
 
     /// The string that begins here.

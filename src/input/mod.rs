@@ -5,9 +5,11 @@
 //! report a fault in the same words.
 
 mod asked;
+mod builder;
 mod document;
 mod head;
 mod json;
+mod lists;
 mod odl;
 mod reject;
 mod rows;

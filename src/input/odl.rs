@@ -12,8 +12,9 @@ impl Document {
     /// Parses a label up to its `END`; what follows, a picture perhaps, is not looked at. `shown` is
     /// the name faults call the file by.
     ///
-    /// `GROUP` and `OBJECT` become tables, sequences and sets lists; units are dropped, and so is the
-    /// name space of a keyword (`MSL:`). A keyword may stand several times.
+    /// `GROUP` and `OBJECT` become tables, sequences and sets lists. The name space of a keyword
+    /// (`MSL:`) is dropped, and a keyword may stand several times. The unit of `KEY` stands under
+    /// `KEY__UNIT`, as VICAR labels have it; that of a list is the list of its values' units.
     ///
     /// # Errors
     /// What is not ODL, with line and column.
@@ -40,9 +41,14 @@ impl Document {
                 }
                 _ => {
                     scanner.equals(keyword)?;
-                    let kind = scanner.value(keyword, DEEPEST)?;
+                    let (kind, unit) = scanner.value(keyword, DEEPEST)?;
                     let name = keyword.rsplit(':').next().unwrap_or(keyword).to_owned();
                     let group = open.last_mut().unwrap_or(&mut top);
+                    if let Some(kind) = unit {
+                        let place = place.clone();
+                        let unit = (format!("{name}__UNIT"), Node { place, kind });
+                        group.entries.push(unit);
+                    }
                     group.entries.push((name, Node { place, kind }));
                 }
             }
@@ -170,17 +176,18 @@ impl<'a> Scanner<'a> {
     fn word(&mut self, expected: &str) -> Result<String, Fault> {
         self.blank()?;
         let place = self.place();
-        match self.value("", 1)? {
+        match self.value("", 1)?.0 {
             Kind::Text(text) => Ok(text),
             other => Err(Fault::found(place, "", shown(other), expected)),
         }
     }
 
-    fn value(&mut self, keyword: &str, levels: usize) -> Result<Kind, Fault> {
+    /// A value and its unit.
+    fn value(&mut self, keyword: &str, levels: usize) -> Result<(Kind, Option<Kind>), Fault> {
         self.blank()?;
         let place = self.place();
         let kind = match self.rest.chars().next() {
-            Some('(' | '{') if levels > 0 => self.list(keyword, levels)?,
+            Some('(' | '{') if levels > 0 => return self.list(keyword, levels),
             Some(quote @ ('"' | '\'')) => {
                 let Some(end) = self.rest[1..].find(quote) else {
                     return Err(Fault::found(
@@ -205,27 +212,37 @@ impl<'a> Scanner<'a> {
                 bare(self.take(end))
             }
         };
-        self.unit(keyword)?;
-        Ok(kind)
+        let unit = self.unit(keyword)?;
+        Ok((kind, unit.map(Kind::Text)))
     }
 
-    fn list(&mut self, keyword: &str, levels: usize) -> Result<Kind, Fault> {
+    /// A list, and the list of its values' units where any has one; a unit behind the whole list is that
+    /// of every value.
+    fn list(&mut self, keyword: &str, levels: usize) -> Result<(Kind, Option<Kind>), Fault> {
         let close = if self.rest.starts_with('(') { ')' } else { '}' };
         let begun = self.place();
         self.take(1);
-        let mut list = Vec::new();
+        let (mut list, mut units) = (Vec::new(), Vec::new());
+        let mut has_unit = false;
         loop {
             self.blank()?;
             if self.rest.starts_with(close) {
                 self.take(1);
-                return Ok(Kind::List(list));
+                let common = self.unit(keyword)?.map(Kind::Text);
+                let own = has_unit.then_some(Kind::List(units));
+                return Ok((Kind::List(list), common.or(own)));
             }
             if self.rest.is_empty() {
                 let found = "a list without an end";
                 return Err(Fault::found(begun, keyword, found, format!("{close:?}")));
             }
             let place = self.place();
-            let kind = self.value(keyword, levels - 1)?;
+            let (kind, unit) = self.value(keyword, levels - 1)?;
+            has_unit |= unit.is_some();
+            units.push(Node {
+                place: place.clone(),
+                kind: unit.unwrap_or_else(|| Kind::Text(String::new())),
+            });
             list.push(Node { place, kind });
             self.blank()?;
             if self.rest.starts_with(',') {
@@ -235,15 +252,16 @@ impl<'a> Scanner<'a> {
     }
 
     /// Takes a unit, `<rad>`, if one follows.
-    fn unit(&mut self, keyword: &str) -> Result<(), Fault> {
+    fn unit(&mut self, keyword: &str) -> Result<Option<String>, Fault> {
         let blanks = self.rest.len() - self.rest.trim_start_matches([' ', '\t']).len();
         if !self.rest[blanks..].starts_with('<') {
-            return Ok(());
+            return Ok(None);
         }
         match self.rest.find('>') {
             Some(end) => {
-                self.take(end + 1);
-                Ok(())
+                let unit = self.take(end + 1);
+                let unit = unit.trim_start().trim_matches(['<', '>']).trim();
+                Ok(Some(unit.to_owned()))
             }
             None => Err(Fault::found(
                 self.place(),
@@ -289,9 +307,13 @@ mod tests {
         assert_eq!(root.number("^IMAGE", .., "a number"), Some(25.0));
         let model = root.section("MODEL");
         assert_eq!(model.triple("A"), Some([1.5, -0.2, 3.0]));
+        assert_eq!(model.texts("A__UNIT").unwrap(), ["m", "m", ""]);
         assert_eq!(model.texts("S").unwrap(), ["X", "Y Z"]);
         assert_eq!(model.text("MASK").unwrap(), "2#0011#");
-        assert_eq!(root.section("IMAGE").integer("LINES", 1..=4), None);
+        let image = root.section("IMAGE");
+        assert_eq!(image.integer("LINES", 1..=4), None);
+        assert_eq!(image.words("LINES__UNIT").unwrap(), ["pixel"]);
+        assert_eq!(image.words("LINES").unwrap(), ["1024"]);
         let faults: Vec<String> = document
             .take_faults()
             .iter()

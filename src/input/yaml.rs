@@ -3,11 +3,9 @@
 use saphyr_parser::{Event, Marker, Parser, ScalarStyle};
 
 use super::Document;
+use super::builder::Builder;
 use super::document::{Kind, Node};
 use crate::error::{Fault, Place};
-
-/// Deeper than any calibration nests.
-const DEEPEST: usize = 100;
 
 impl Document {
     /// Parses the first document of a YAML file. `shown` is the name faults call the file by. A key
@@ -36,9 +34,26 @@ impl Document {
             if matches!(event, Event::DocumentEnd) {
                 break;
             }
-            builder.take(event, place(shown, span.start))?;
+            take(&mut builder, event, place(shown, span.start))?;
         }
         Ok(Document::of(shown, builder.finish()))
+    }
+}
+
+fn take(builder: &mut Builder<'_>, event: Event<'_>, place: Place) -> Result<(), Fault> {
+    match event {
+        Event::MappingStart(..) => builder.begin(place, Kind::Table(Vec::new())),
+        Event::SequenceStart(..) => builder.begin(place, Kind::List(Vec::new())),
+        Event::MappingEnd | Event::SequenceEnd => builder.end(),
+        Event::Scalar(text, style, ..) => {
+            let kind = match style {
+                ScalarStyle::Plain => plain(&text),
+                _ => Kind::Text(text.into_owned()),
+            };
+            builder.put(Node { place, kind })
+        }
+        Event::Alias(_) => Err(Fault::found(place, "", "an alias", "a plain value")),
+        _ => Ok(()),
     }
 }
 
@@ -47,115 +62,6 @@ fn place(shown: &str, marker: Marker) -> Place {
         file: shown.to_owned(),
         line: Some(marker.line() as u64),
         column: Some(marker.col() as u64 + 1),
-    }
-}
-
-/// A table or list that is being filled.
-struct Open {
-    place: Place,
-    kind: Kind,
-    /// The key that waits for its value, in a table.
-    key: Option<(String, Place)>,
-}
-
-struct Builder<'a> {
-    shown: &'a str,
-    open: Vec<Open>,
-    root: Option<Node>,
-}
-
-impl<'a> Builder<'a> {
-    fn new(shown: &'a str) -> Self {
-        Self {
-            shown,
-            open: Vec::new(),
-            root: None,
-        }
-    }
-
-    fn take(&mut self, event: Event<'_>, place: Place) -> Result<(), Fault> {
-        match event {
-            Event::MappingStart(..) => self.begin(place, Kind::Table(Vec::new())),
-            Event::SequenceStart(..) => self.begin(place, Kind::List(Vec::new())),
-            Event::MappingEnd | Event::SequenceEnd => match self.open.pop() {
-                Some(Open { place, kind, .. }) => self.put(Node { place, kind }),
-                None => Ok(()),
-            },
-            Event::Scalar(text, style, ..) => {
-                let kind = match style {
-                    ScalarStyle::Plain => plain(&text),
-                    _ => Kind::Text(text.into_owned()),
-                };
-                self.put(Node { place, kind })
-            }
-            Event::Alias(_) => Err(Fault::found(place, "", "an alias", "a plain value")),
-            _ => Ok(()),
-        }
-    }
-
-    fn begin(&mut self, place: Place, kind: Kind) -> Result<(), Fault> {
-        if let Some(Open {
-            kind: Kind::Table(_),
-            key: None,
-            ..
-        }) = self.open.last()
-        {
-            return Err(Fault::found(place, "", "a key that is no text", "text"));
-        }
-        if self.open.len() >= DEEPEST {
-            let expected = format!("at most {DEEPEST}");
-            return Err(Fault::found(place, "", "more levels than that", expected));
-        }
-        self.open.push(Open {
-            place,
-            kind,
-            key: None,
-        });
-        Ok(())
-    }
-
-    /// Gives a finished value its place in the tree.
-    fn put(&mut self, node: Node) -> Result<(), Fault> {
-        let Some(parent) = self.open.last_mut() else {
-            self.root.get_or_insert(node);
-            return Ok(());
-        };
-        match &mut parent.kind {
-            Kind::List(list) => list.push(node),
-            Kind::Table(entries) => match parent.key.take() {
-                None => {
-                    let key = key_text(node.kind);
-                    if entries.iter().any(|(k, _)| *k == key) {
-                        return Err(Fault::found(node.place, key, "the key twice", "it once"));
-                    }
-                    parent.key = Some((key, node.place));
-                }
-                Some((key, place)) => {
-                    if !matches!(&node.kind, Kind::Other(word) if word == "null") {
-                        let kind = node.kind;
-                        entries.push((key, Node { place, kind }));
-                    }
-                }
-            },
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn finish(self) -> Node {
-        Node {
-            place: Place::file(self.shown),
-            kind: self.root.map_or(Kind::Table(Vec::new()), |n| n.kind),
-        }
-    }
-}
-
-fn key_text(kind: Kind) -> String {
-    match kind {
-        Kind::Text(text) | Kind::Other(text) => text,
-        Kind::Number(x) => x.to_string(),
-        Kind::Boolean(b) => b.to_string(),
-        Kind::List(_) | Kind::Table(_) => String::new(),
     }
 }
 

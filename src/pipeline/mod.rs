@@ -15,6 +15,7 @@ mod paths;
 mod pictures;
 mod publish;
 mod read;
+mod read_site;
 mod schema;
 mod stages;
 mod summary;

@@ -201,8 +201,14 @@ impl<'a> Map<'a> {
         let layers = self.layers();
         let formats = &self.config.output.formats;
         let mut products: Vec<Product> = mosaic.into_iter().collect();
+        let on_map = self.on_map(&layers)?;
         for format in formats {
-            products.extend(format.write(&layers)?);
+            let layers = if *format == Format::GeoJson {
+                &layers
+            } else {
+                &on_map
+            };
+            products.extend(format.write(layers)?);
         }
         let evidence = layers.iter().filter(|l| l.geometry.is_none());
         for layer in evidence {
@@ -216,9 +222,24 @@ impl<'a> Map<'a> {
             products.extend(shown.map(|l| Product::new(format!("{}.qml", l.name), qgis::qml(l))));
         }
         let has_mosaic = products.iter().any(|p| p.name == "mosaic.tif");
-        products.extend(self.project_file(&layers, has_mosaic)?);
+        products.extend(self.project_file(&layers, &on_map, has_mosaic)?);
         products.extend(self.catalogue_item(&layers, &products));
         Ok(products)
+    }
+
+    /// The layers in the system that the run asks for, which GeoJSON knows nothing of.
+    fn on_map(&self, layers: &[Layer]) -> Result<Vec<Layer>, Error> {
+        let Some(crs) = &self.config.output.crs else {
+            return Ok(layers.to_vec());
+        };
+        let on_map = layers.iter().map(|layer| match layer.geometry {
+            None => Ok(layer.clone()),
+            Some(_) => layer.on_map(crs),
+        });
+        on_map.collect::<Result<_, _>>().map_err(|error| {
+            let system = crs.definition();
+            Error::Output(format!("cannot write the map in {system}: {error}"))
+        })
     }
 
     fn layers(&self) -> Vec<Layer> {
@@ -235,7 +256,12 @@ impl<'a> Map<'a> {
     }
 
     /// A QGIS project over the files of the format that serves it best, if there is one.
-    fn project_file(&self, layers: &[Layer], has_mosaic: bool) -> Result<Option<Product>, Error> {
+    fn project_file(
+        &self,
+        layers: &[Layer],
+        on_map: &[Layer],
+        has_mosaic: bool,
+    ) -> Result<Option<Product>, Error> {
         let best = [Format::GeoPackage, Format::GeoJson, Format::FlatGeobuf];
         let is_written = |format: &Format| self.config.output.formats.contains(format);
         let Some(format) = best.into_iter().find(is_written) else {
@@ -243,7 +269,11 @@ impl<'a> Map<'a> {
         };
         let project = qgis::Project {
             title: &self.config.site.name,
-            layers,
+            layers: if format == Format::GeoJson {
+                layers
+            } else {
+                on_map
+            },
             format,
             site: self.scene.site,
             has_mosaic,
@@ -261,6 +291,7 @@ impl<'a> Map<'a> {
             assets: files
                 .chain(["rejects.csv", "run.json"])
                 .filter_map(stac::Asset::of)
+                .map(|asset| asset.on_map(self.config.output.crs.as_ref()))
                 .collect(),
         };
         Some(Product::new("stac.json", stac::text(&item)?))

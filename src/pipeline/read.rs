@@ -6,14 +6,15 @@ use std::sync::Arc;
 
 use super::Observer;
 use super::checks::cross_checks;
-use super::config::{Config, Heights};
+use super::config::Config;
 use super::digest::{InputFile, digest};
 use super::paths::Source;
 use super::pictures::PictureDigest;
+use super::read_site::{datum, geoid_files, origin, site, terrain};
 use crate::camera::{Camera, CameraFile, read_camera_file};
 use crate::detection::{Detection, DetectionFile, read_detections};
 use crate::error::{Error, Fault, Place};
-use crate::frame::{DatumError, Geodetic, Site, VerticalDatum};
+use crate::frame::{Site, VerticalDatum};
 use crate::input::{Reason, Reject};
 use crate::pose::{PoseFile, read_poses};
 use crate::terrain::Terrain;
@@ -146,29 +147,6 @@ fn input_files(
     Ok(files)
 }
 
-/// The grids that heights are shifted by, each once.
-fn geoid_files(
-    datum: Option<&VerticalDatum>,
-    terrain: Option<&Terrain>,
-) -> Result<Vec<InputFile>, Error> {
-    let own = datum.map_or(&[][..], VerticalDatum::grids);
-    let grids = own
-        .iter()
-        .chain(terrain.map_or(&[][..], Terrain::geoid_grids));
-    let mut files = Vec::new();
-    let mut seen = HashSet::new();
-    for grid in grids {
-        if seen.insert(&grid.path) {
-            let source = Source {
-                path: grid.path.clone(),
-                shown: grid.name.clone(),
-            };
-            files.push(digest("geoid", &source, None)?);
-        }
-    }
-    Ok(files)
-}
-
 /// Faults of all inputs, so that they are told together.
 #[derive(Default)]
 pub(super) struct Faults {
@@ -191,7 +169,7 @@ impl Faults {
         all
     }
 
-    fn add(&mut self, error: Error) {
+    pub(super) fn add(&mut self, error: Error) {
         match error {
             Error::Faults(faults) => self.faults.extend(faults),
             other => self
@@ -205,112 +183,6 @@ impl Faults {
             Ok(())
         } else {
             Err(Error::Faults(self.faults))
-        }
-    }
-}
-
-/// The first pose that has a place on the planet.
-fn first_place(poses: &[Read<PoseFile>]) -> Option<Geodetic> {
-    let mut rows = poses.iter().flat_map(|(_, _, file)| &file.rows);
-    rows.find_map(crate::pose::PoseRow::geodetic)
-}
-
-/// What heights are above, around the run's origin; `None` for the ellipsoid.
-fn datum(config: &Config, poses: &[Read<PoseFile>], faults: &mut Faults) -> Option<VerticalDatum> {
-    let around = config.site.origin.or_else(|| first_place(poses))?;
-    let datum = match config.site.height.as_ref()? {
-        Heights::Crs(code) => VerticalDatum::new(code, config.site.planet, around),
-        Heights::Grid(grid) => VerticalDatum::from_grid(&grid.path, &grid.shown, around),
-    };
-    let told = |error: &_| Fault::new(Place::default(), "site.height", format!("{error}"));
-    datum
-        .map_err(|error: DatumError| faults.faults.push(told(&error)))
-        .ok()
-}
-
-/// The origin that the run names, with its height above the ellipsoid; on the way all poses are put
-/// into true north and ellipsoidal heights.
-fn origin(
-    config: &Config,
-    poses: &mut [Read<PoseFile>],
-    datum: Option<&VerticalDatum>,
-    faults: &mut Faults,
-) -> Option<Geodetic> {
-    let origin = match (config.site.origin, datum) {
-        (Some(origin), Some(datum)) => match datum.to_ellipsoidal(origin) {
-            Ok(origin) => Some(origin),
-            Err(error) => {
-                let fault = Fault::new(Place::default(), "site.origin", error.to_string());
-                faults.faults.push(fault);
-                Some(origin)
-            }
-        },
-        (origin, _) => origin,
-    };
-    let heading = config.heading();
-    for (_, shown, file) in poses {
-        file.refer(shown, &heading, datum, origin);
-    }
-    origin
-}
-
-/// The site of a run: its named origin, or the first pose.
-fn site(
-    config: &Config,
-    origin: Option<Geodetic>,
-    poses: &[Read<PoseFile>],
-    faults: &mut Faults,
-) -> Site {
-    if config.site.origin.is_none()
-        && let Some((_, shown, _)) = poses.iter().find(|(_, _, file)| file.is_local)
-    {
-        faults.faults.push(Fault::found(
-            Place::file(shown),
-            "x_m",
-            "offsets from an origin",
-            "the run to name it: [site] origin = { lat_deg = ..., lon_deg = ..., height_m = ... }",
-        ));
-    }
-    let origin = origin.or_else(|| first_place(poses));
-    let nowhere = Geodetic::from_degrees(0.0, 0.0, 0.0);
-    Site::new(config.site.planet, origin.unwrap_or(nowhere))
-}
-
-fn terrain(
-    config: &Config,
-    site: Site,
-    datum: Option<&VerticalDatum>,
-    faults: &mut Faults,
-) -> Option<Terrain> {
-    let spec = &config.terrain;
-    // A surface of one height above a geoid is taken for one above the ellipsoid, as at the origin.
-    let plane_m = match (spec.plane_m, datum) {
-        (Some(height_m), Some(datum)) => {
-            let place = Geodetic {
-                height_m,
-                ..site.origin()
-            };
-            let place = datum.to_ellipsoidal(place).map_err(|error| {
-                let fault = Fault::new(Place::default(), "terrain.plane_m", error.to_string());
-                faults.faults.push(fault);
-            });
-            Some(place.ok()?.height_m)
-        }
-        (plane_m, _) => plane_m,
-    };
-    if spec.path.is_empty() {
-        return Some(Terrain::constant_height(site, plane_m?));
-    }
-    let files: Vec<(PathBuf, String)> = spec
-        .path
-        .iter()
-        .map(|s| (s.path.clone(), s.shown.clone()))
-        .collect();
-    match Terrain::open(site, &files, plane_m, datum) {
-        Ok(terrain) => Some(terrain),
-        Err(error) => {
-            faults.add(error);
-            None
         }
     }
 }

@@ -1,25 +1,29 @@
 //! Comma-separated values: any layer, and rejects.csv.
 
-use super::layer::{DECIMALS, Field, FieldKind, Geometry, Kind, Layer, Value};
+use super::layer::{Field, FieldKind, Geometry, Kind, Layer, Value};
 use super::wkt;
 use crate::error::Error;
+use crate::frame::CrsText;
 use crate::input::Reject;
 
-/// A layer as a table: points as `lon_deg, lat_deg`, lines and polygons as `wkt`, before the
-/// properties.
+/// A layer as a table: points as `lon_deg, lat_deg`, on a map in metres as `easting_m, northing_m` and
+/// on any other as `x, y`, lines and polygons as `wkt`, before the properties.
 ///
 /// # Errors
 /// A table that cannot be written.
 pub fn bytes(layer: &Layer) -> Result<Vec<u8>, Error> {
     let mut header: Vec<&str> = match layer.geometry {
-        Some(Kind::Point) => vec!["lon_deg", "lat_deg"],
+        Some(Kind::Point) => names(layer)?.to_vec(),
         Some(Kind::Line | Kind::Polygon) => vec!["wkt"],
         None => Vec::new(),
     };
     header.extend(layer.fields.iter().map(|f| f.name));
     let mut csv = Csv::new(&header)?;
     for feature in &layer.features {
-        let mut row = feature.geometry.as_ref().map_or(Vec::new(), place);
+        let mut row = feature
+            .geometry
+            .as_ref()
+            .map_or(Vec::new(), |g| place(g, layer.decimals()));
         let values = layer.fields.iter().zip(&feature.values);
         row.extend(values.map(|(field, value)| text(field, value)));
         csv.row(&row)?;
@@ -70,13 +74,26 @@ fn in_memory(error: impl std::fmt::Display) -> Error {
     Error::Output(format!("cannot write a table: {error}"))
 }
 
-fn place(geometry: &Geometry) -> Vec<String> {
+/// What the coordinates of points are called.
+fn names(layer: &Layer) -> Result<[&'static str; 2], Error> {
+    let Some(crs) = layer.crs.as_ref().filter(|crs| crs.is_projected()) else {
+        return Ok(["lon_deg", "lat_deg"]);
+    };
+    let text = CrsText::of(crs.definition()).map_err(in_memory)?;
+    Ok(if text.is_in_metres {
+        ["easting_m", "northing_m"]
+    } else {
+        ["x", "y"]
+    })
+}
+
+fn place(geometry: &Geometry, decimals: usize) -> Vec<String> {
     match geometry {
         Geometry::Point(at) => vec![
-            format!("{:.DECIMALS$}", at.x),
-            format!("{:.DECIMALS$}", at.y),
+            format!("{:.decimals$}", at.x),
+            format!("{:.decimals$}", at.y),
         ],
-        parts => vec![wkt::text(parts)],
+        parts => vec![wkt::text(parts, decimals)],
     }
 }
 

@@ -15,7 +15,7 @@ use crate::frame::CrsText;
 /// What the encoder says.
 pub fn bytes(layer: &Layer) -> Result<Vec<u8>, Error> {
     let failed = |why: String| Error::Output(format!("cannot write {}.fgb: {why}", layer.name));
-    let crs = CrsText::of_map(layer.planet).map_err(|e| failed(e.to_string()))?;
+    let crs = layer.crs_text().map_err(|e| failed(e.to_string()))?;
     write(layer, &crs).map_err(|e| failed(e.to_string()))
 }
 

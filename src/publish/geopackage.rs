@@ -12,7 +12,7 @@ use super::layer::{Feature, FieldKind, Geometry, Kind, Layer, Value};
 use super::qgis;
 use super::wkt;
 use crate::error::Error;
-use crate::frame::{CrsText, Planet};
+use crate::frame::CrsText;
 use crate::pose::Time;
 
 /// The column of geometries.
@@ -38,7 +38,7 @@ fn write(layers: &[Layer]) -> Result<Vec<u8>, Box<dyn std::error::Error>> {
     let transaction = db.transaction()?;
     let changed = last_change(layers);
     for layer in layers {
-        let srs_id = add_crs(&transaction, layer.planet)?;
+        let srs_id = add_crs(&transaction, &layer.crs_text()?)?;
         add_layer(&transaction, layer, srs_id, &changed)?;
     }
     add_styles(&transaction, layers, &changed)?;
@@ -48,15 +48,14 @@ fn write(layers: &[Layer]) -> Result<Vec<u8>, Box<dyn std::error::Error>> {
     Ok(db.serialize(MAIN_DB)?.to_vec())
 }
 
-/// Enters the system of a planet's map; gives the number it goes by in the file.
-fn add_crs(db: &Connection, planet: Planet) -> Result<i32, Box<dyn std::error::Error>> {
-    let crs = CrsText::of_map(planet)?;
+/// Enters a system; gives the number it goes by in the file.
+fn add_crs(db: &Connection, crs: &CrsText) -> rusqlite::Result<i32> {
     let (authority, code) = if crs.code > 0 {
         (crs.authority.as_str(), crs.code)
     } else {
         ("NONE", OWN_CODE)
     };
-    let wkt1 = crs.geographic_wkt1();
+    let wkt1 = crs.wkt1();
     let has_wkt1 = wkt1.is_some();
     let definition = wkt1.unwrap_or("undefined".to_owned());
     let sql = "INSERT OR IGNORE INTO gpkg_spatial_ref_sys VALUES (?, ?, ?, ?, ?, NULL)";

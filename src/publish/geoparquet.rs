@@ -11,7 +11,6 @@ use self::parquet::{Cell, Column, Type};
 use super::layer::{Field, FieldKind, Geometry, Kind, Layer, Value};
 use super::wkt;
 use crate::error::Error;
-use crate::frame::CrsText;
 
 /// The column of geometries.
 const GEOMETRY: &str = "geometry";
@@ -31,7 +30,8 @@ pub fn bytes(layer: &Layer) -> Result<Vec<u8>, Error> {
     if let Some(kind) = layer.geometry {
         columns.push(geometries(layer));
         columns.extend(boxes(layer));
-        let crs = CrsText::of_map(layer.planet)
+        let crs = layer
+            .crs_text()
             .map_err(|e| Error::Output(format!("cannot write {}.parquet: {e}", layer.name)))?;
         metadata.push(("geo", geo_metadata(layer, kind, crs.projjson).to_string()));
     }

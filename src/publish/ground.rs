@@ -2,7 +2,7 @@
 
 use geo::{BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon, Rect};
 
-use super::layer::lon_lat;
+use super::layer::{DECIMALS, lon_lat};
 use super::simple::simple;
 use crate::frame::{Enu, Geodetic, Planet, Point, Site};
 
@@ -107,7 +107,7 @@ impl Cartographer<'_> {
                 x: c.x - turn / 360.0,
                 y: c.y,
             });
-            simple(&moved.intersection(&page).map_coords(from_unit)).0
+            simple(&moved.intersection(&page).map_coords(from_unit), DECIMALS).0
         });
         parts.collect()
     }
@@ -176,7 +176,7 @@ fn on_the_map(unrolled: &Polygon<f64>) -> Vec<Polygon<f64>> {
     };
     let (min, max) = (bounds.min(), bounds.max());
     if min.x >= -180.0 && max.x <= 180.0 {
-        return simple(&unrolled.clone().into()).0;
+        return simple(&unrolled.clone().into(), DECIMALS).0;
     }
     // Near a pole an area spans many longitudes and hardly any latitude: both are stretched alike for
     // the 30 bits of the Boolean operations.
@@ -197,10 +197,13 @@ fn on_the_map(unrolled: &Polygon<f64>) -> Vec<Polygon<f64>> {
         }
         let page = Rect::new((west, -margin), (east, 2.0 * margin));
         let part = flat.intersection(&page.to_polygon());
-        simple(&part.map_coords(|c| Coord {
-            x: to_edge(c.x - turn, hair_deg),
-            y: min.y + c.y / stretch,
-        }))
+        simple(
+            &part.map_coords(|c| Coord {
+                x: to_edge(c.x - turn, hair_deg),
+                y: min.y + c.y / stretch,
+            }),
+            DECIMALS,
+        )
         .0
     });
     parts.collect()
@@ -356,7 +359,7 @@ mod tests {
                     for polygon in &drawn {
                         for c in polygon.exterior().coords() {
                             assert!(c.x.abs() <= 180.0 && c.y.abs() <= 90.0, "{at}");
-                            assert_eq!(*c, super::super::layer::on_grid(*c), "{at}");
+                            assert_eq!(*c, super::super::layer::on_grid(*c, DECIMALS), "{at}");
                         }
                     }
                     count += drawn.0.len();

@@ -2,7 +2,7 @@
 
 use geo::{BoundingRect, Coord, MultiPolygon, Rect};
 
-use crate::frame::{Geodetic, Planet};
+use crate::frame::{Crs, CrsError, CrsText, Geodetic, Planet};
 use crate::pose::Time;
 
 /// A layer: features of one kind of geometry with the same properties in each, or a table without
@@ -19,6 +19,8 @@ pub struct Layer {
     pub geometry: Option<Kind>,
     /// The planet its places are on.
     pub planet: Planet,
+    /// The system its geometries are in, where it is not the planet's map.
+    pub crs: Option<Crs>,
     /// Its properties.
     pub fields: Vec<Field>,
     /// Its features: those with a geometry sorted by id, rows of a table as they came.
@@ -86,7 +88,7 @@ pub struct Feature {
     pub values: Vec<Value>,
 }
 
-/// A geometry in (longitude, latitude) of the planet's map, degrees.
+/// A geometry in (longitude, latitude) of the planet's map, degrees, or in the layer's own system.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Geometry {
     /// A place.
@@ -175,6 +177,7 @@ impl Layer {
             about,
             geometry,
             planet,
+            crs: None,
             fields: Vec::new(),
             features: Vec::new(),
         }
@@ -199,7 +202,26 @@ impl Layer {
         self
     }
 
-    /// The box around all its geometries, degrees; `None` where there are none.
+    /// What other programs call the system its geometries are in.
+    ///
+    /// # Errors
+    /// [`CrsError::Unknown`] where PROJ does not know it.
+    pub fn crs_text(&self) -> Result<CrsText, CrsError> {
+        match &self.crs {
+            None => CrsText::of_map(self.planet),
+            Some(crs) => CrsText::of(crs.definition()),
+        }
+    }
+
+    /// Decimals of its coordinates: a tenth of a millimetre on Earth.
+    pub fn decimals(&self) -> usize {
+        match &self.crs {
+            Some(crs) if crs.is_projected() => DECIMALS_OF_LENGTHS,
+            _ => DECIMALS,
+        }
+    }
+
+    /// The box around all its geometries, in the units of its system; `None` where there are none.
     pub fn bounds(&self) -> Option<Rect<f64>> {
         let all = self.features.iter().filter_map(|f| f.geometry.as_ref());
         all.filter_map(Geometry::bounds).reduce(union)
@@ -207,7 +229,7 @@ impl Layer {
 }
 
 impl Geometry {
-    /// The box around it, degrees; `None` where it is empty.
+    /// The box around it; `None` where it is empty.
     pub fn bounds(&self) -> Option<Rect<f64>> {
         match self {
             Self::Point(at) => Some(Rect::new(*at, *at)),
@@ -246,6 +268,9 @@ pub fn union(a: Rect<f64>, b: Rect<f64>) -> Rect<f64> {
 /// Decimals of coordinates in degrees: a tenth of a millimetre on Earth.
 pub const DECIMALS: usize = 9;
 
+/// Decimals of coordinates in metres, or in feet.
+pub const DECIMALS_OF_LENGTHS: usize = 4;
+
 /// A number rounded to `decimals` places; never a negative zero.
 pub fn rounded(x: f64, decimals: usize) -> f64 {
     let scale = 10f64.powi(i32::try_from(decimals).unwrap_or(0));
@@ -256,14 +281,14 @@ pub fn rounded(x: f64, decimals: usize) -> f64 {
 /// files have them, longitudes eastward in every format.
 pub fn lon_lat(place: Geodetic, planet: Planet) -> Coord<f64> {
     let (y, x) = planet.eastward().lat_lon_deg(place);
-    on_grid(Coord { x, y })
+    on_grid(Coord { x, y }, DECIMALS)
 }
 
-/// The nearest coordinate that the map's decimals can write.
-pub fn on_grid(at: Coord<f64>) -> Coord<f64> {
+/// The nearest coordinate that so many decimals can write.
+pub fn on_grid(at: Coord<f64>, decimals: usize) -> Coord<f64> {
     Coord {
-        x: rounded(at.x, DECIMALS),
-        y: rounded(at.y, DECIMALS),
+        x: rounded(at.x, decimals),
+        y: rounded(at.y, decimals),
     }
 }
 

@@ -19,6 +19,7 @@ pub mod mosaic;
 pub mod picture;
 pub mod qgis;
 pub mod report;
+mod reproject;
 mod residual;
 mod rock;
 mod scene;

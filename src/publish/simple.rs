@@ -9,9 +9,10 @@ use super::layer::on_grid;
 /// How often an area is mended before its hull must do.
 const ROUNDS: usize = 5;
 
-/// An area whose corners have the decimals of the map, and which is valid with exactly those:
+/// An area whose corners have so many decimals, and which is valid with exactly those:
 /// rounding can fold what is thinner than the last decimal. What has no extent then is gone.
-pub(super) fn simple(area: &MultiPolygon<f64>) -> MultiPolygon<f64> {
+pub(super) fn simple(area: &MultiPolygon<f64>, decimals: usize) -> MultiPolygon<f64> {
+    let on_the_grid = |area: &MultiPolygon<f64>| on_the_grid(area, decimals);
     let mut rounded = on_the_grid(area);
     for _ in 0..ROUNDS {
         if rounded.is_valid() {
@@ -29,9 +30,9 @@ pub(super) fn simple(area: &MultiPolygon<f64>) -> MultiPolygon<f64> {
 }
 
 /// The area with rounded corners, without rings that have shrunk to a line or a point.
-fn on_the_grid(area: &MultiPolygon<f64>) -> MultiPolygon<f64> {
+fn on_the_grid(area: &MultiPolygon<f64>, decimals: usize) -> MultiPolygon<f64> {
     let ring = |ring: &geo::LineString<f64>| {
-        let mut coords: Vec<Coord<f64>> = ring.coords().copied().map(on_grid).collect();
+        let mut coords: Vec<Coord<f64>> = ring.coords().map(|c| on_grid(*c, decimals)).collect();
         coords.dedup();
         geo::LineString::new(coords)
     };
@@ -81,6 +82,7 @@ fn share(x: f64, min: f64, extent: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::publish::layer::DECIMALS;
     use geo::{Area, polygon};
 
     #[test]
@@ -88,14 +90,14 @@ mod tests {
         let square: MultiPolygon<f64> =
             polygon![(x: 0.0, y: 0.0), (x: 1.0, y: 0.0), (x: 1.000_000_000_4, y: 1.0), (x: 0.0, y: 1.0)]
                 .into();
-        let out = simple(&square);
+        let out = simple(&square, DECIMALS);
         assert_eq!(out.unsigned_area(), 1.0);
     }
 
     #[test]
     fn a_bow_tie_becomes_two_triangles() {
         let tie = polygon![(x: 0.0, y: 0.0), (x: 1.0, y: 1.0), (x: 1.0, y: 0.0), (x: 0.0, y: 1.0)];
-        let out = simple(&tie.into());
+        let out = simple(&tie.into(), DECIMALS);
         assert!(out.is_valid());
         assert_eq!(out.0.len(), 2);
         assert!((out.unsigned_area() - 0.5).abs() < 1e-8);
@@ -117,7 +119,7 @@ mod tests {
                 };
                 let ring: Vec<Coord<f64>> = (0..64).map(corner).collect();
                 let ellipse = Polygon::new(ring.into(), Vec::new());
-                let out = simple(&ellipse.into());
+                let out = simple(&ellipse.into(), DECIMALS);
                 assert!(out.is_valid(), "{degree} {thin}: {out:?}");
             }
         }
@@ -126,6 +128,6 @@ mod tests {
     #[test]
     fn what_is_smaller_than_the_grid_is_gone() {
         let speck = polygon![(x: 0.0, y: 0.0), (x: 1e-10, y: 0.0), (x: 0.0, y: 1e-10)];
-        assert!(simple(&speck.into()).0.is_empty());
+        assert!(simple(&speck.into(), DECIMALS).0.is_empty());
     }
 }

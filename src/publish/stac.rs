@@ -5,7 +5,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::format::Format;
 use super::layer::{Geometry, Layer, Value, union};
-use crate::frame::{CrsText, Planet};
+use crate::frame::{Crs, CrsText, Planet};
 use crate::pose::Time;
 
 /// What an item says.
@@ -32,6 +32,8 @@ pub struct Asset {
     pub media_type: &'static str,
     /// What it is for: `data`, `metadata`.
     pub role: &'static str,
+    /// Its coordinate reference system, where it is not the planet's own.
+    pub crs: Option<String>,
 }
 
 impl Asset {
@@ -58,7 +60,18 @@ impl Asset {
             title: name.to_owned(),
             media_type,
             role,
+            crs: None,
         })
+    }
+
+    /// The same, where its layers are in the system of that code.
+    #[must_use]
+    pub fn on_map(self, crs: Option<&Crs>) -> Self {
+        let is_map = self.role == "data" && self.media_type != Format::GeoJson.media_type();
+        let crs = crs
+            .filter(|_| is_map)
+            .map(|crs| crs.definition().to_owned());
+        Self { crs, ..self }
     }
 }
 
@@ -93,12 +106,23 @@ pub fn text(item: &Item<'_>) -> Option<String> {
         properties.insert("ssys:targets".to_owned(), json!([body]));
     }
     let assets = item.assets.iter().map(|asset| {
-        let about = json!({
+        let mut about = json!({
             "href": format!("./{}", asset.file),
             "title": asset.title,
             "type": asset.media_type,
             "roles": [asset.role],
         });
+        let crs = asset.crs.as_ref().and_then(|crs| CrsText::of(crs).ok());
+        match crs {
+            Some(crs) if crs.code > 0 => {
+                about["proj:code"] = json!(format!("{}:{}", crs.authority, crs.code));
+            }
+            Some(crs) => {
+                about["proj:code"] = Json::Null;
+                about["proj:projjson"] = crs.projjson;
+            }
+            None => {}
+        }
         (asset.file.clone(), about)
     });
     let value = json!({

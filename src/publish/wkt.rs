@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 
 use geo::{Coord, Orient, Polygon, orient::Direction};
 
-use super::layer::{DECIMALS, Geometry};
+use super::layer::Geometry;
 
-/// A geometry as text.
-pub fn text(geometry: &Geometry) -> String {
+/// A geometry as text, its coordinates with so many decimals.
+pub fn text(geometry: &Geometry, decimals: usize) -> String {
+    let list = |coords: &[Coord<f64>]| list(coords, decimals);
     let (kind, parts): (&str, Vec<String>) = match geometry {
-        Geometry::Point(at) => return format!("POINT ({})", pair(at)),
+        Geometry::Point(at) => return format!("POINT ({})", pair(at, decimals)),
         Geometry::Lines(lines) => ("MULTILINESTRING", lines.iter().map(|l| list(l)).collect()),
         Geometry::Polygons(polygons) => {
             let polygons = polygons.orient(Direction::Default);
@@ -62,15 +63,20 @@ fn rings(polygon: &Polygon<f64>) -> impl Iterator<Item = &[Coord<f64>]> {
     rings.map(|ring| ring.0.as_slice())
 }
 
-fn pair(at: &Coord<f64>) -> String {
-    format!("{:.DECIMALS$} {:.DECIMALS$}", at.x, at.y)
+fn pair(at: &Coord<f64>, decimals: usize) -> String {
+    format!("{:.decimals$} {:.decimals$}", at.x, at.y)
 }
 
-fn list(coords: &[Coord<f64>]) -> String {
+fn list(coords: &[Coord<f64>], decimals: usize) -> String {
     let mut text = String::from("(");
     for (i, at) in coords.iter().enumerate() {
         // Writing to a String cannot fail.
-        let _ = write!(text, "{}{}", if i == 0 { "" } else { ", " }, pair(at));
+        let _ = write!(
+            text,
+            "{}{}",
+            if i == 0 { "" } else { ", " },
+            pair(at, decimals)
+        );
     }
     text.push(')');
     text
@@ -108,17 +114,17 @@ mod tests {
     fn text_and_binary_of_each_kind() {
         let at = |x: f64, y: f64| Coord { x, y };
         let point = Geometry::Point(at(1.5, -2.0));
-        assert_eq!(text(&point), "POINT (1.500000000 -2.000000000)");
+        assert_eq!(text(&point, 9), "POINT (1.500000000 -2.000000000)");
         // The bytes that PostGIS gives for POINT(1.5 -2).
         let hex: String = binary(&point).iter().map(|b| format!("{b:02x}")).collect();
         assert_eq!(hex, "0101000000000000000000f83f00000000000000c0");
         let lines = Geometry::Lines(vec![vec![at(0.0, 0.0), at(1.0, 0.0)]]);
-        assert!(text(&lines).starts_with("MULTILINESTRING ((0.000000000 0.0"));
+        assert!(text(&lines, 9).starts_with("MULTILINESTRING ((0.000000000 0.0"));
         assert_eq!(binary(&lines).len(), 5 + 4 + 5 + 4 + 2 * 16);
         let clockwise = polygon![(x: 0.0, y: 0.0), (x: 0.0, y: 1.0), (x: 1.0, y: 1.0)];
         let area = Geometry::Polygons(clockwise.into());
         assert_eq!(
-            text(&area),
+            text(&area, 9),
             "MULTIPOLYGON (((0.000000000 0.000000000, 1.000000000 1.000000000, \
              0.000000000 1.000000000, 0.000000000 0.000000000)))"
         );

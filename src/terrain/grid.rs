@@ -24,6 +24,9 @@ pub enum HeightsAbove {
     Ellipsoid,
     /// The zero of a vertical CRS, by its code.
     Datum(String),
+    /// The horizontal plane at the site's origin, in which the raster's coordinates are metres east and
+    /// north of it; then the raster names no CRS.
+    SiteOrigin,
 }
 
 /// The heights of a raster, metres, row by row, NaN where unknown.
@@ -146,6 +149,16 @@ impl HeightGrid {
     /// The definition of the CRS, as PROJ understands it.
     pub fn crs(&self) -> &str {
         &self.crs
+    }
+
+    /// As many posts with other heights, elsewhere.
+    pub(super) fn on_map(self, posts: Posts, crs_from_post: Affine, crs: String) -> Self {
+        Self {
+            posts,
+            crs_from_post,
+            crs,
+            ..self
+        }
     }
 
     /// The part between two columns and two rows, all included.

@@ -19,10 +19,12 @@
 mod ascii;
 mod cell;
 mod constant;
+mod geoid;
 mod geotiff;
 mod grid;
 mod holes;
 mod leg;
+mod local;
 mod march;
 mod model;
 mod mosaic;
@@ -38,6 +40,7 @@ mod tests;
 use crate::frame::{CrsError, Direction, Enu, GeoidGrid, Point, Ray, Site};
 
 pub use ascii::read_ascii_grid;
+pub use geoid::{datum_of_grid, vertical_datum};
 pub use geotiff::{read_geotiff, write_geotiff};
 pub use grid::{Affine, GridError, HeightGrid, HeightsAbove, Posts};
 pub use open::read_heights;
@@ -115,6 +118,10 @@ impl Terrain {
         grids: Vec<HeightGrid>,
         outside_m: Option<f64>,
     ) -> Result<Self, (usize, CrsError)> {
+        let grids: Vec<HeightGrid> = grids
+            .into_iter()
+            .map(|grid| local::on_planet(&site, grid))
+            .collect();
         let shape = match (grids.is_empty(), outside_m) {
             (true, Some(height_m)) => Shape::Constant(height_m),
             _ => Shape::Model(Box::new(Model::new(&site, grids, outside_m)?)),

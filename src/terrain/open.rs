@@ -7,15 +7,15 @@ use rayon::prelude::*;
 
 use super::ascii::{is_ascii_grid, read_ascii_grid};
 use super::grid::{HeightGrid, HeightsAbove, Posts};
-use super::planetary::{is_pds3, is_pds4, read_pds3, read_pds4};
+use super::planetary::{is_pds3, is_pds4, is_vicar, read_pds3, read_pds4, read_vicar};
 use super::tile::within_reach;
-use super::{Shape, Terrain, read_geotiff};
+use super::{Shape, Terrain, read_geotiff, vertical_datum};
 use crate::error::{Error, Fault, Place};
 use crate::frame::{Crs, DatumError, Geodetic, Point, Site, VerticalDatum};
 
 /// Reads a height model in any of the formats there are, told apart by what the file begins with:
-/// GeoTIFF, ESRI ASCII grid with its `.prj` beside it, and the labels of PDS3 and PDS4. Messages call the
-/// file `shown`.
+/// GeoTIFF, ESRI ASCII grid with its `.prj` beside it, the labels of PDS3 and PDS4, and VICAR. Messages
+/// call the file `shown`.
 ///
 /// # Errors
 /// [`Error::Io`] where the file cannot be read, and faults where it is none of these or a format's
@@ -31,6 +31,8 @@ pub fn read_heights(path: &Path, shown: &str) -> Result<HeightGrid, Error> {
         read_pds3(path, shown)
     } else if is_pds4(&start) {
         read_pds4(path, shown)
+    } else if is_vicar(&start) {
+        read_vicar(path, shown)
     } else {
         read_geotiff(path, shown)
     }
@@ -106,10 +108,12 @@ fn above_ellipsoid(
 ) -> Result<(HeightGrid, Option<VerticalDatum>), Fault> {
     let named;
     let datum = match (grid.heights_above(), run) {
-        (HeightsAbove::Ellipsoid, _) | (HeightsAbove::Unsaid, None) => return Ok((grid, None)),
+        (HeightsAbove::Ellipsoid | HeightsAbove::SiteOrigin, _) | (HeightsAbove::Unsaid, None) => {
+            return Ok((grid, None));
+        }
         (HeightsAbove::Unsaid, Some(datum)) => datum,
         (HeightsAbove::Datum(code), _) => {
-            named = VerticalDatum::new(code, site.planet(), site.origin())
+            named = vertical_datum(code, site.planet(), site.origin())
                 .map_err(|error| Fault::new(place.clone(), "VerticalGeoKey", error.to_string()))?;
             &named
         }

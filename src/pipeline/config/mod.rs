@@ -105,7 +105,8 @@ impl Config {
         let view = view::view(root.section("view"));
         let noise = noise::noise(root.section("noise"));
         let fusion = fusion::fusion(root.section("fusion"));
-        let output = output::output(root.section("output"), path, overrides);
+        let planet = site.as_ref().map(|site| site.planet);
+        let output = output::output(root.section("output"), path, overrides, planet);
         // Only now may a fault end it: all sections have told theirs.
         Some(Self {
             site: site?,

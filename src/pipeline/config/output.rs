@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::super::formats::formats;
 use super::{Overrides, POSITIVE};
+use crate::frame::{Crs, Planet};
 use crate::input::Section;
 use crate::publish::{Format, Layout, Picture, picture};
 
@@ -19,6 +20,12 @@ pub struct OutputConfig {
     pub dir: PathBuf,
     /// Map formats.
     pub formats: Vec<Format>,
+    /// The system that maps other than GeoJSON are written in; default: the planet's own.
+    #[serde(
+        serialize_with = "crate::pipeline::paths::crs",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub crs: Option<Crs>,
     /// Whether pictures are annotated.
     pub annotate: bool,
     /// What the annotated pictures show.
@@ -49,18 +56,24 @@ pub(super) fn output(
     section: Section<'_>,
     path: &Path,
     overrides: &Overrides,
+    planet: Option<Planet>,
 ) -> Option<OutputConfig> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let stem = path.file_stem().unwrap_or_default();
     let written = section.text("dir").map(|dir| folder.join(dir));
     let dir = written.unwrap_or_else(|| folder.join("../outputs").join(stem));
     let formats = formats(&section);
+    let crs = section.text("crs").zip(planet).and_then(|(text, planet)| {
+        let crs = Crs::for_map(&text, planet);
+        crs.map_err(|e| section.problem("crs", e.to_string())).ok()
+    });
     let config = OutputConfig {
         min_exist: section
             .number("min_exist", 0.0..=1.0, "0 to 1")
             .unwrap_or(0.05),
         dir: overrides.out.clone().unwrap_or(dir),
         formats: formats.clone().unwrap_or_default(),
+        crs,
         annotate: section.boolean("annotate").unwrap_or(true),
         annotate_layout: layout(&section),
         annotate_only: section.texts("annotate_only").unwrap_or_default(),

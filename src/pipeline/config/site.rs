@@ -90,7 +90,11 @@ pub(super) fn site(section: Section<'_>, path: &Path, paths: &Paths) -> Option<S
 /// The vertical CRS of heights. Which grids it takes shows only where the site is known.
 fn heights(section: &Section<'_>, paths: &Paths, planet: Option<Planet>) -> Option<Heights> {
     let text = section.text("height")?;
-    if text.to_ascii_lowercase().ends_with(".gtx") {
+    let name = text.to_ascii_lowercase();
+    if [".gtx", ".tif", ".tiff"]
+        .iter()
+        .any(|end| name.ends_with(end))
+    {
         let grids = paths.sources(section, "height")?;
         return grids.into_iter().next().map(Heights::Grid);
     }

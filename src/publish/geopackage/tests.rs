@@ -276,3 +276,33 @@ fn nothing_still_has_tables_and_the_same_bytes_come_twice() {
     let full = layers(Planet::EARTH);
     assert_eq!(bytes(&full).unwrap(), bytes(&full).unwrap());
 }
+
+#[test]
+fn a_layer_on_a_map_has_its_system() {
+    for (code, authority, number) in [
+        ("EPSG:32633", "EPSG", 32633),
+        ("+proj=laea +lat_0=20 +lon_0=10 +type=crs", "NONE", 100_000),
+    ] {
+        let crs = crate::frame::Crs::for_map(code, Planet::EARTH).unwrap();
+        let on_map = |layer: &Layer| match layer.geometry {
+            Some(_) => layer.on_map(&crs).unwrap(),
+            None => layer.clone(),
+        };
+        let layers: Vec<Layer> = layers(Planet::EARTH).iter().map(on_map).collect();
+        let (_file, db) = opened(&bytes(&layers).unwrap());
+        assert_eq!(
+            rows(&db, "PRAGMA foreign_key_check"),
+            Vec::<Vec<Sql>>::new()
+        );
+        let sql = format!(
+            "SELECT organization, organization_coordsys_id, substr(definition, 1, 7) FROM \
+             gpkg_spatial_ref_sys WHERE srs_id = {number}"
+        );
+        let expected = [[text(authority), Sql::Integer(number), text("PROJCS[")]];
+        assert_eq!(rows(&db, &sql), expected);
+        let sql = "SELECT DISTINCT srs_id FROM gpkg_geometry_columns";
+        assert_eq!(rows(&db, sql), [[Sql::Integer(number)]]);
+        let sql = "SELECT min_x > 1000, max_y > 1000 FROM gpkg_contents WHERE table_name = 'rocks'";
+        assert_eq!(rows(&db, sql), [[Sql::Integer(1), Sql::Integer(1)]]);
+    }
+}

@@ -2,6 +2,7 @@ use geo::{Coord, MultiPolygon};
 
 use super::super::layer::Column as LayerColumn;
 use super::*;
+use crate::frame::CrsText;
 use crate::frame::Planet;
 use crate::pose::Time;
 

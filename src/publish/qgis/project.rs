@@ -136,7 +136,7 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
         corners(&extent)
     );
     for layer in &layers {
-        let mut shown = map_layer(project.format, layer, &geographic);
+        let mut shown = map_layer(project.format, layer, &layer.crs_text()?);
         if project.has_mosaic && layer.name == "rocks" {
             // So that the rocks of the pictures show through their discs.
             shown = shown.replace(OPAQUE, "<layerOpacity>0.5</layerOpacity>");
@@ -198,16 +198,14 @@ fn extent(
     let crs = Crs::new(definition, planet)?;
     let place = |at: Geodetic| crs.xy(at.lon, at.lat);
     let origin = place(project.site.origin())?;
-    let geometries = layers
-        .iter()
-        .flat_map(|l| &l.features)
-        .filter_map(|f| f.geometry.as_ref());
-    let corners = geometries
-        .filter_map(super::super::layer::Geometry::bounds)
-        .flat_map(|b| [b.min(), b.max()]);
+    let corners = layers.iter().flat_map(|l| {
+        let geometries = l.features.iter().filter_map(|f| f.geometry.as_ref());
+        let boxes = geometries.filter_map(super::super::layer::Geometry::bounds);
+        boxes.flat_map(|b| [(b.min(), l.crs.as_ref()), (b.max(), l.crs.as_ref())])
+    });
     // A place that the projection does not reach, over a pole, does not count.
-    let boxes = corners.filter_map(|c| {
-        let (x, y) = place(planet.eastward().place(c.y, c.x, 0.0)).ok()?;
+    let boxes = corners.filter_map(|(c, layer_crs)| {
+        let (x, y) = place(layer_place(c.x, c.y, layer_crs, planet)?).ok()?;
         Some(Rect::new((x, y), (x, y)))
     });
     let all = boxes.reduce(union).unwrap_or(Rect::new(origin, origin));
@@ -217,6 +215,16 @@ fn extent(
         (min.x - margin, min.y - margin),
         (max.x + margin, max.y + margin),
     ))
+}
+
+/// The place of a layer's coordinates.
+fn layer_place(x: f64, y: f64, crs: Option<&Crs>, planet: Planet) -> Option<Geodetic> {
+    let Some(crs) = crs else {
+        return Some(planet.eastward().place(y, x, 0.0));
+    };
+    let (lon, lat) = crs.lon_lat(x, y).ok()?;
+    let height_m = 0.0;
+    Some(Geodetic { lat, lon, height_m })
 }
 
 fn corners(extent: &Rect<f64>) -> String {
@@ -252,7 +260,7 @@ fn map_layer(format: Format, layer: &Layer, crs: &CrsText) -> String {
         layer.name,
         escaped(&source(format, layer)),
         escaped(layer.title),
-        system(crs, true),
+        system(crs, crs.is_geographic()),
         style(layer)
     )
 }

@@ -79,8 +79,12 @@ fn project_over(planet: Planet, place: Geodetic, format: Format, has_mosaic: boo
         site: &site,
         has_mosaic,
     };
-    let bytes = qgz(&project).unwrap();
-    assert_eq!(bytes, qgz(&project).unwrap());
+    unpacked(&project)
+}
+
+fn unpacked(project: &Project<'_>) -> String {
+    let bytes = qgz(project).unwrap();
+    assert_eq!(bytes, qgz(project).unwrap());
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
     assert_eq!(archive.len(), 1);
     let mut text = String::new();
@@ -134,4 +138,30 @@ fn the_mosaic_lies_under_everything_else() {
     assert!(text.contains(
         "type=\"multibandcolor\" redBand=\"1\" greenBand=\"2\" blueBand=\"3\" alphaBand=\"4\""
     ));
+}
+
+/// Layers of another system than the planet's own say so, and the project opens where they are.
+#[test]
+fn layers_on_a_map_name_its_system() {
+    let karlsruhe = Geodetic::from_degrees(49.0, 8.4, 0.0);
+    let crs = crate::frame::Crs::for_map("EPSG:25833", Planet::EARTH).unwrap();
+    let layer = rocks(Planet::EARTH, &[("rock", None)]);
+    let layers = [layer.on_map(&crs).unwrap()];
+    let site = Site::new(Planet::EARTH, karlsruhe);
+    let project = Project {
+        title: "A",
+        layers: &layers,
+        format: Format::GeoPackage,
+        site: &site,
+        has_mosaic: false,
+    };
+    let text = unpacked(&project);
+    assert!(
+        text.contains("<srid>25833</srid>\n<authid>EPSG:25833</authid>"),
+        "{text}"
+    );
+    assert!(!text.contains("EPSG:4326"));
+    assert!(text.contains("<geographicflag>false</geographicflag>"));
+    // The extent is in UTM zone 32, about the place.
+    assert!(text.contains("<xmin>456114.096</xmin>"), "{text}");
 }

@@ -94,6 +94,24 @@ impl GeoKeys {
         Ok(Self { keys })
     }
 
+    /// From texts: a code or number with its meaning in brackets behind it, or words.
+    pub fn of_texts(keys: impl Iterator<Item = (u16, String)>) -> Self {
+        let value = |text: &str| {
+            let text = text.trim();
+            let first = text.split('(').next().unwrap_or("").trim();
+            if let Ok(code) = first.parse() {
+                Value::Short(code)
+            } else if let Ok(number) = first.parse() {
+                Value::Double(number)
+            } else {
+                Value::Text(text.to_owned())
+            }
+        };
+        Self {
+            keys: keys.map(|(key, text)| (key, value(&text))).collect(),
+        }
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.keys.is_empty()

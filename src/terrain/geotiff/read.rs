@@ -12,7 +12,7 @@ use crate::error::{Error, Fault, Place};
 use crate::terrain::{Affine, HeightGrid, Posts};
 
 use super::keys::{GeoKeys, KeyFault, RASTER_TYPE};
-use super::projection;
+use super::{place, projection};
 
 /// GDAL's tag for scale, offset and the like.
 const GDAL_METADATA: Tag = Tag::Unknown(42112);
@@ -207,8 +207,6 @@ fn geo_keys(reader: &mut Reader) -> Result<GeoKeys, Problem> {
     Ok(keys)
 }
 
-/// Where the posts stand: by one tie point and a pixel scale, or by a matrix (clause 7.4 of the
-/// standard). Pixels are areas unless the file says points, and a post is in the middle of its.
 fn crs_from_post(reader: &mut Reader, is_point: bool) -> Result<Affine, Problem> {
     let mut doubles = |tag| -> Result<Vec<f64>, Problem> {
         Ok(match reader.find_tag(tag)? {
@@ -219,47 +217,7 @@ fn crs_from_post(reader: &mut Reader, is_point: bool) -> Result<Affine, Problem>
     let matrix = doubles(Tag::ModelTransformationTag)?;
     let tie = doubles(Tag::ModelTiepointTag)?;
     let scale = doubles(Tag::ModelPixelScaleTag)?;
-    let corner = match (matrix.as_slice(), tie.as_slice(), scale.as_slice()) {
-        (&[a, b, _, x, c, d, _, y, ..], _, _) => Affine {
-            x0: x,
-            x_column: a,
-            x_row: b,
-            y0: y,
-            y_column: c,
-            y_row: d,
-        },
-        (_, &[i, j, _, x, y, _, ..], &[sx, sy, ..]) => {
-            let middle = if is_point { 0.0 } else { 0.5 };
-            return Ok(Affine {
-                x0: x + (middle - i) * sx,
-                x_column: sx,
-                x_row: 0.0,
-                y0: y - (middle - j) * sy,
-                y_column: 0.0,
-                y_row: -sy,
-            });
-        }
-        (_, tie, _) if tie.len() > 6 => {
-            return Err(Problem::found(
-                "ModelTiepoint",
-                format!("{} tie points without ModelPixelScale", tie.len() / 6),
-                "one and ModelPixelScale, or ModelTransformation",
-            ));
-        }
-        _ => {
-            return Err(Problem::found(
-                "",
-                "no georeferencing",
-                "ModelTiepoint and ModelPixelScale, or ModelTransformation",
-            ));
-        }
-    };
-    let (x0, y0) = if is_point {
-        (corner.x0, corner.y0)
-    } else {
-        corner.apply(0.5, 0.5)
-    };
-    Ok(Affine { x0, y0, ..corner })
+    Ok(place::crs_from_post(&matrix, &tie, &scale, is_point)?)
 }
 
 fn nodata(reader: &mut Reader) -> Result<Option<f64>, Problem> {

@@ -443,10 +443,9 @@ fn models_of_elsewhere_are_refused() {
     let error = Terrain::open(mars, &files, None, None)
         .unwrap_err()
         .to_string();
-    assert!(
-        error.starts_with(
-            "a.tif: crs: found \"EPSG:32632\", expected a coordinate reference system"
-        ),
-        "{error}"
+    assert_eq!(
+        error,
+        "a.tif: crs: found \"EPSG:32632\" (WGS 84 / UTM zone 32N, of 6378.1 km), expected one of mars, \
+         of 3396.2 km"
     );
 }

@@ -8,6 +8,10 @@ use super::Problem;
 use crate::error::Error;
 use crate::terrain::Posts;
 
+/// No height or radius in metres or kilometres is beyond this; what is stands for nothing, as the
+/// largest single number does in many files.
+const BEYOND_ALL: f64 = 1e30;
+
 /// The most posts a file may hold.
 const MAX_POSTS: u64 = 1 << 31;
 
@@ -81,7 +85,8 @@ impl Image {
 
     fn height(&self, bytes: &[u8]) -> f64 {
         let sample = self.sample.value(bytes);
-        let known = sample.is_finite() && !self.unknown.contains(&sample);
+        let is_unknown = |&unknown: &f64| self.sample.rounded(unknown) == sample;
+        let known = sample.abs() < BEYOND_ALL && !self.unknown.iter().any(is_unknown);
         if known {
             sample * self.scale + self.shift
         } else {
@@ -91,6 +96,15 @@ impl Image {
 }
 
 impl SampleType {
+    /// A number as a sample of this type holds it: labels give `-9999.99` for the nearest single.
+    #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
+    fn rounded(self, number: f64) -> f64 {
+        match (self.kind, self.bytes) {
+            (Kind::Real, 4) => f64::from(number as f32),
+            _ => number,
+        }
+    }
+
     /// The number in a sample's bytes.
     #[expect(clippy::cast_precision_loss, reason = "heights are far below 2^53")]
     fn value(self, bytes: &[u8]) -> f64 {

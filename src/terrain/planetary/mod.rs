@@ -1,11 +1,13 @@
 //! Height models as planetary archives have them: a label that says what stands where in a plain
-//! image, and which map it is on (PDS3, PDS4).
+//! image, and which map it is on (PDS3, PDS4, VICAR).
 
 mod image;
+mod label;
+mod label_map;
 mod map;
-mod odl;
 mod pds3;
 mod pds4;
+mod vicar;
 
 #[cfg(test)]
 mod tests;
@@ -14,20 +16,28 @@ use crate::error::{Fault, Place};
 
 pub(super) use pds3::{is_pds3, read_pds3};
 pub(super) use pds4::{is_pds4, read_pds4};
+pub(super) use vicar::{is_vicar, read_vicar};
 
 /// What is wrong with a label: in which field, and how.
 #[derive(Debug)]
 struct Problem {
+    /// Where in the label, if that is known.
+    place: Option<Place>,
     field: String,
     problem: String,
 }
 
 impl Problem {
-    fn found(field: &str, found: impl std::fmt::Display, expected: &str) -> Self {
+    fn new(field: &str, problem: impl std::fmt::Display) -> Self {
         Self {
+            place: None,
             field: field.to_owned(),
-            problem: format!("found {found}, expected {expected}"),
+            problem: problem.to_string(),
         }
+    }
+
+    fn found(field: &str, found: impl std::fmt::Display, expected: &str) -> Self {
+        Self::new(field, format!("found {found}, expected {expected}"))
     }
 
     fn missing(field: &str, expected: &str) -> Self {
@@ -35,6 +45,7 @@ impl Problem {
     }
 
     fn fault(self, shown: &str) -> Fault {
-        Fault::new(Place::file(shown), self.field, self.problem)
+        let place = self.place.unwrap_or_else(|| Place::file(shown));
+        Fault::new(place, self.field, self.problem)
     }
 }

@@ -26,12 +26,8 @@ pub(in crate::terrain) fn is_pds4(start: &[u8]) -> bool {
 pub(in crate::terrain) fn read_pds4(path: &Path, shown: &str) -> Result<HeightGrid, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?;
     let told = |problem: Problem| Error::from(problem.fault(shown));
-    let document = Document::parse(&text).map_err(|error| {
-        told(Problem {
-            field: String::new(),
-            problem: format!("not XML: {error}"),
-        })
-    })?;
+    let document = Document::parse(&text)
+        .map_err(|error| told(Problem::new("", format!("not XML: {error}"))))?;
     let root = document.root_element();
     let label = label(root).map_err(told)?;
     let posts = label
@@ -39,12 +35,8 @@ pub(in crate::terrain) fn read_pds4(path: &Path, shown: &str) -> Result<HeightGr
         .read(&path.with_file_name(&label.file))?
         .map_err(told)?;
     let (columns, rows) = (label.image.columns, label.image.rows);
-    HeightGrid::new(columns, rows, posts, label.map, label.crs).map_err(|error| {
-        told(Problem {
-            field: String::new(),
-            problem: error.to_string(),
-        })
-    })
+    HeightGrid::new(columns, rows, posts, label.map, label.crs)
+        .map_err(|error| told(Problem::new("", error)))
 }
 
 /// What a label says.
