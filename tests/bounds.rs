@@ -10,6 +10,7 @@ use nalgebra::{SMatrix, SVector, Vector2, Vector3, Vector6};
 use rockmap::adjust::{LevelPlane, Measurement, Problem, Reading};
 use rockmap::bound::{BoundMap, Fair, Partition, clairvoyant, fair};
 use rockmap::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
+use rockmap::detection::Cut;
 use rockmap::existence::{Exposure, Prior};
 use rockmap::frame::{Body, Enu, Pixel, RigidTransform, Rotation, Vector};
 use rockmap::pose::{Pose, PoseSigma};
@@ -143,7 +144,7 @@ impl Scene {
                 },
                 log_size: Some(log_size),
                 box_px: None,
-                is_cut: false,
+                cut: Cut::NONE,
                 class: 0,
                 score: None,
             })
@@ -371,7 +372,7 @@ fn derivatives_agree_with_differences() {
             reading,
             log_size: None,
             box_px: None,
-            is_cut: false,
+            cut: Cut::NONE,
             class: 0,
             score: None,
         };

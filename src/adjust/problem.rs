@@ -3,7 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::Surface;
-use crate::detection::{Detection, Mark};
+use crate::detection::{Cut, Detection, Mark};
 use crate::frame::Pixel;
 use crate::project::{LineOfSight, Miss, Range, Settings, sight};
 use crate::view::View;
@@ -60,8 +60,8 @@ pub struct Measurement {
     pub log_size: Option<f64>,
     /// Width and height of the mark's box, pixels, where it has one.
     pub box_px: Option<Vector2<f64>>,
-    /// Whether the picture's border cuts it.
-    pub is_cut: bool,
+    /// What the picture's border takes away of it.
+    pub cut: Cut,
     /// What the detector says it is; measurements of one object share it, unless the detector takes
     /// classes for each other.
     pub class: usize,
@@ -161,7 +161,7 @@ impl Measurement {
                 Mark::Box(b) => Some(Vector2::new(b.width(), b.height())),
                 _ => None,
             },
-            is_cut: is_cut(detection, view),
+            cut: cut(detection, view),
             class: 0,
             score: detection.score,
         })
@@ -171,10 +171,10 @@ impl Measurement {
 /// Boxes nearer than this to the picture's border are taken for cut by it, pixels.
 const BORDER_PX: f64 = 3.0;
 
-fn is_cut(detection: &Detection, view: &View) -> bool {
+fn cut(detection: &Detection, view: &View) -> Cut {
     match (detection.mark, view.camera.as_deref()) {
-        (Mark::Box(b), Some(camera)) => !b.is_whole(camera.width, camera.height, BORDER_PX),
-        _ => false,
+        (Mark::Box(b), Some(camera)) => b.cut(camera.width, camera.height, BORDER_PX),
+        _ => Cut::NONE,
     }
 }
 

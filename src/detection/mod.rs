@@ -125,6 +125,42 @@ impl PixelBox {
             && self.x_max <= f64::from(width) - 0.5 - margin
             && self.y_max <= f64::from(height) - 0.5 - margin
     }
+
+    /// Which of its sides the border of a picture of this size cuts: those with an end within
+    /// `margin` pixels of it. A box that reaches farther out is as large as its detector takes the
+    /// object to be.
+    pub fn cut(&self, width: u32, height: u32, margin: f64) -> Cut {
+        let is_cut = |low: f64, high: f64, length: u32| {
+            let lies_on = |end: f64, border: f64| (end - border).abs() < margin;
+            lies_on(low, -0.5) || lies_on(high, f64::from(length) - 0.5)
+        };
+        Cut {
+            across: is_cut(self.x_min, self.x_max, width),
+            down: is_cut(self.y_min, self.y_max, height),
+        }
+    }
+}
+
+/// What a picture's border takes away of a box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cut {
+    /// Part of its width.
+    pub across: bool,
+    /// Part of its height.
+    pub down: bool,
+}
+
+impl Cut {
+    /// Nothing.
+    pub const NONE: Self = Self {
+        across: false,
+        down: false,
+    };
+
+    /// Whether it takes anything.
+    pub fn is_any(self) -> bool {
+        self.across || self.down
+    }
 }
 
 impl Detection {
@@ -140,5 +176,29 @@ impl Detection {
     /// The key its rejects and evidence name it by.
     pub fn key(&self) -> String {
         format!("{}/{}", self.image_id, self.det_id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn borders_cut_what_ends_at_them_and_no_more() {
+        let cut = |x_min, y_min, x_max, y_max| {
+            let b = PixelBox {
+                x_min,
+                y_min,
+                x_max,
+                y_max,
+            };
+            let cut = b.cut(640, 480, 3.0);
+            (cut.across, cut.down)
+        };
+        assert_eq!(cut(10.0, 10.0, 50.0, 50.0), (false, false));
+        assert_eq!(cut(-0.5, 10.0, 50.0, 50.0), (true, false));
+        assert_eq!(cut(600.0, 450.0, 637.0, 481.0), (true, true));
+        // Too far out for a border that cuts.
+        assert_eq!(cut(-9.0, 10.0, 50.0, 485.0), (false, false));
     }
 }

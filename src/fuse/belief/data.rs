@@ -9,6 +9,7 @@ use super::algebra::{Square6, from_matrix};
 use super::{BeliefSettings, SizeRule};
 use crate::adjust::{Measurement, Problem, Reading};
 use crate::camera::{Camera, Lens};
+use crate::detection::Cut;
 use crate::frame::{Body, LocalEnu, Pixel, RigidTransform, Vector};
 use crate::view::View;
 
@@ -56,8 +57,10 @@ pub(super) struct Look {
     pub(super) n: usize,
     /// Logarithm of the apparent size in pixels, where there is one.
     pub(super) log_px: Option<f64>,
-    /// Whether the picture's border cuts the mark.
-    pub(super) is_cut: bool,
+    /// What the picture's border takes away of the mark.
+    pub(super) cut: Cut,
+    /// Whether it takes part of the side that says the size.
+    pub(super) is_size_cut: bool,
     pub(super) class: usize,
     /// Logit of the detector's score.
     pub(super) logit: Option<f64>,
@@ -234,7 +237,11 @@ fn look(index: usize, m: &Measurement, view: usize, settings: &BeliefSettings) -
         has,
         n,
         log_px,
-        is_cut: m.is_cut,
+        cut: m.cut,
+        is_size_cut: match settings.size_rule {
+            SizeRule::Width => m.cut.across,
+            SizeRule::Height => m.cut.down,
+        },
         class: m.class,
         logit: m.score.filter(|_| settings.scores).map(logit),
     }

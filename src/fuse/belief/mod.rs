@@ -13,6 +13,7 @@
 //! use nalgebra::{UnitQuaternion, Vector2};
 //! use rockmap::adjust::{LevelPlane, Measurement, Problem, Reading};
 //! use rockmap::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
+//! use rockmap::detection::Cut;
 //! use rockmap::frame::{Point, RigidTransform, Rotation, Vector};
 //! use rockmap::fuse::belief::{BeliefSettings, fuse_belief};
 //! use rockmap::pose::{Pose, PoseSigma};
@@ -73,7 +74,7 @@
 //!             },
 //!             log_size: Some(side_px.ln()),
 //!             box_px: Some(Vector2::new(side_px, side_px)),
-//!             is_cut: false,
+//!             cut: Cut::NONE,
 //!             class: 0,
 //!             score: Some(0.9),
 //!         });

@@ -8,7 +8,7 @@ pub(super) const CONTAMINATION: f64 = 0.03;
 /// How many times their variance.
 pub(super) const WIDE: f64 = 25.0;
 /// A border cuts this share of a box's width, and of its height, one standard deviation.
-const CUT_SHARES: (f64, f64) = (0.5, 0.2);
+const CUT_SHARES: (f64, f64) = (0.5, 0.5);
 /// And this of the logarithm of its size.
 const CUT_LOG_SIZE: f64 = 0.5;
 
@@ -31,9 +31,13 @@ pub(super) fn variances(look: &Look, scales: &Scales, shape: f64) -> [f64; 4] {
         let own = (shape * px * scale).powi(2);
         r[0] += own;
         r[1] += own * 0.25;
-        if look.is_cut {
+        if look.cut.across {
             r[0] += (CUT_SHARES.0 * px).powi(2);
+        }
+        if look.cut.down {
             r[1] += (CUT_SHARES.1 * px).powi(2);
+        }
+        if look.is_size_cut {
             r[2] += CUT_LOG_SIZE * CUT_LOG_SIZE;
         }
     }

@@ -37,6 +37,7 @@ pub struct FusionConfig {
     pub size_m: Option<(f64, f64)>,
     /// `belief`: which classes the detector takes for which: for each true class the classes it says,
     /// with their probabilities.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub confusion: BTreeMap<String, BTreeMap<String, f64>>,
     /// `belief`: errors of looks at one object fade in this time, seconds.
     pub geometry_time_s: f64,

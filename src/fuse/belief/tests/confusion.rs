@@ -8,6 +8,7 @@ use rand_distr::{Distribution, Normal};
 
 use crate::adjust::{LevelPlane, Measurement, Problem, Reading};
 use crate::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
+use crate::detection::Cut;
 use crate::frame::{Pixel, Point, RigidTransform, Rotation, Vector};
 use crate::fuse::belief::{Belief, BeliefSettings, Confusion, fuse_belief};
 use crate::pose::{Pose, PoseSigma};
@@ -90,7 +91,7 @@ fn measurements(views: &[View]) -> Vec<Measurement> {
                 },
                 log_size: None,
                 box_px: None,
-                is_cut: false,
+                cut: Cut::NONE,
                 class: usize::from(!says_first),
                 score: None,
             });

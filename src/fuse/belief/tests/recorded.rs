@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::adjust::{LevelPlane, Measurement, Problem, Reading};
 use crate::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
+use crate::detection::Cut;
 use crate::frame::{Pixel, RigidTransform, Rotation, Vector};
 use crate::fuse::belief::algebra::{Square4, Square6};
 use crate::fuse::belief::curve::Detectability;
@@ -140,12 +141,16 @@ fn measurement(value: &Value) -> Measurement {
             },
         }
     };
+    let is_cut = index(&value["cut"]) == 1;
     Measurement {
         view: index(&value["view"]),
         reading,
         log_size: None,
         box_px: log_px.map(|l| Vector2::new(l.exp(), 1.0)),
-        is_cut: index(&value["cut"]) == 1,
+        cut: Cut {
+            across: is_cut,
+            down: is_cut,
+        },
         class: 0,
         score: None,
     }
