@@ -21,7 +21,7 @@ const LEAST_ROUNDS: usize = 3;
 /// They are over where no object moves farther, metres.
 const STILL_M: f64 = 1e-3;
 /// Registration is tried again where more than this share of the detections changed company.
-const DOUBT: f64 = 0.03;
+const DOUBT: f64 = 0.015;
 /// Squared scales of the robust steps between registration and association.
 const SCHEDULE: [f64; 7] = [400.0, 100.0, 100.0, 25.0, 25.0, 9.0, 9.0];
 
