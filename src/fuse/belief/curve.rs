@@ -1,7 +1,9 @@
 //! How often an object is detected, by its apparent size or its range.
 
-/// The curve counts for this many looks in each bin before any data.
+/// What a bin and its neighbours say counts for this many looks in the bin ...
 const PRIOR_COUNT: f64 = 6.0;
+/// ... and what all bins say for this many in it and its neighbours.
+const NEAR_COUNT: f64 = 2.0;
 /// The share that is detected, before any data.
 const START: f64 = 0.5;
 
@@ -75,8 +77,13 @@ impl Detectability {
             y[bin] += detected;
         }
         let mean = (y.iter().sum::<f64>() + 2.0 * START) / (n.iter().sum::<f64>() + 2.0);
-        for (value, (n, y)) in self.values.iter_mut().zip(n.iter().zip(&y)) {
-            *value = ((y + PRIOR_COUNT * mean) / (n + PRIOR_COUNT)).clamp(0.02, 0.98);
+        for (bin, value) in self.values.iter_mut().enumerate() {
+            let near = bin.saturating_sub(1)..(bin + 2).min(n.len());
+            let (looks, detected) = (&n[near.clone()], &y[near]);
+            let start = (detected.iter().sum::<f64>() + NEAR_COUNT * mean)
+                / (looks.iter().sum::<f64>() + NEAR_COUNT);
+            let of_bin = (y[bin] + PRIOR_COUNT * start) / (n[bin] + PRIOR_COUNT);
+            *value = of_bin.clamp(0.02, 0.98);
         }
     }
 }
@@ -92,9 +99,12 @@ mod tests {
         // 14 looks in the second bin, 13 of them detections; nothing elsewhere.
         curve.learn((0..14).map(|i| (1.5, 1.0, if i == 0 { 0.0 } else { 1.0 })));
         let mean = (13.0 + 1.0) / (14.0 + 2.0);
-        let second = (13.0 + 6.0 * mean) / 20.0;
+        // The third bin has its neighbours' share, and the fourth that of all.
+        let near = (13.0 + 2.0 * mean) / 16.0;
+        let second = (13.0 + 6.0 * near) / 20.0;
         assert!((curve.at(1.5) - second).abs() < 1e-15);
-        assert!((curve.at(2.0) - 0.5 * (second + mean)).abs() < 1e-15);
+        assert!((curve.at(2.0) - 0.5 * (second + near)).abs() < 1e-15);
+        assert!((curve.at(3.5) - mean).abs() < 1e-15);
         assert_eq!(curve.at(-3.0), curve.values()[0]);
         assert_eq!(curve.at(f64::NAN), curve.values()[0]);
         assert_eq!(curve.at(9.0), curve.values()[3]);

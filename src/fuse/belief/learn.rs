@@ -30,45 +30,37 @@ const CLUTTER_VARIANCES: (f64, f64) = (0.05, 2.0);
 /// That scores say nothing counts for this many detections of each kind.
 const SCORE_COUNT: f64 = 3.0;
 
-/// Sums over pairs of the proportion w of objects and a logit x.
-#[derive(Debug, Default)]
-struct Mixture {
+/// How much of its own score counts where it is judged which kind a detection is.
+const OWN_SCORE: f64 = 0.8;
+
+/// Weighted moments about a first guess that counts for some weight.
+struct Moments {
     n: f64,
-    x2: f64,
-    /// Of w w, w (1 - w) and (1 - w) (1 - w).
-    squares: [f64; 3],
-    /// Of w x and (1 - w) x.
-    with_x: [f64; 2],
+    sum: f64,
+    squares: f64,
 }
 
-impl Mixture {
-    fn of(judged: impl Iterator<Item = (f64, f64)>, before: &Scores) -> Scores {
-        let overall = 0.5 * (before.object + before.clutter);
-        let (mut sums, rest) = (Self::default(), SCORE_COUNT);
-        for (w, x) in judged {
-            let x = x - overall;
-            sums.n += 1.0;
-            sums.x2 += x * x;
-            sums.squares[0] += w * w;
-            sums.squares[1] += w * (1.0 - w);
-            sums.squares[2] += (1.0 - w) * (1.0 - w);
-            sums.with_x[0] += w * x;
-            sums.with_x[1] += (1.0 - w) * x;
+impl Moments {
+    fn new(n: f64, at: f64) -> Self {
+        Self {
+            n,
+            sum: n * at,
+            squares: n * at * at,
         }
-        let [a, b, c] = sums.squares;
-        let (a, c) = (a + rest, c + rest);
-        let det = a * c - b * b;
-        let [p, q] = sums.with_x;
-        let (object, clutter) = ((c * p - b * q) / det, (a * q - b * p) / det);
-        // Of the scatter about the mixtures, part is that of the two kinds about each other.
-        let left = sums.x2 - object * p - clutter * q;
-        let apart = (object - clutter).powi(2) * sums.squares[1];
-        let variance = (left - apart + rest * before.variance) / (sums.n + rest);
-        Scores {
-            object: overall + object,
-            clutter: overall + clutter,
-            variance: variance.max(LEAST_SCORE_VARIANCE),
-        }
+    }
+
+    fn add(&mut self, weight: f64, x: f64) {
+        self.n += weight;
+        self.sum += weight * x;
+        self.squares += weight * x * x;
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / self.n
+    }
+
+    fn scatter(&self) -> f64 {
+        (self.squares - self.sum * self.sum / self.n).max(0.0)
     }
 }
 
@@ -281,22 +273,39 @@ impl Engine<'_> {
         self.model.size.variance = (scatter / n).clamp(SIZE_VARIANCES.0, SIZE_VARIANCES.1);
     }
 
-    /// Scores of objects and of clutter. Whether a detection's object is real is judged without the
-    /// score of that detection, so that what scores say does not confirm itself. Most of these
-    /// judgements are no certainties: the means of both kinds are those that explain each score best
-    /// as a mixture in the proportion judged (least squares), and the variance is what that leaves.
+    /// Scores of objects and of clutter. Where a detection's object is judged real or not, its own
+    /// score counts a little less than it would: where nothing else tells objects from clutter, what
+    /// scores say fades round by round instead of confirming itself.
     fn learn_scores(&mut self, evidence: &Evidence) {
         let Some(scores) = self.model.scores else {
             return;
         };
-        let mut real = vec![0.0; self.looks.len()];
+        let overall = 0.5 * (scores.object + scores.clutter);
+        let mut object = Moments::new(SCORE_COUNT, overall);
+        let mut clutter = Moments::new(SCORE_COUNT, overall);
+        let mut unowned = vec![1.0; self.looks.len()];
         for (edge, worth) in self.edges.iter().zip(&evidence.edge_worth) {
-            let own = edge.weight * worth * self.score_odds(&self.looks[edge.look]);
-            real[edge.look] += edge.weight * probability(evidence.log_odds[edge.object] - own);
+            let look = &self.looks[edge.look];
+            let Some(logit) = look.logit else { continue };
+            unowned[edge.look] -= edge.weight;
+            let own = (1.0 - OWN_SCORE) * edge.weight * worth * self.score_odds(look);
+            let real = probability(evidence.log_odds[edge.object] - own);
+            object.add(edge.weight * real, logit);
+            clutter.add(edge.weight * (1.0 - real), logit);
         }
-        let judged = self.looks.iter().zip(&real);
-        let judged = judged.filter_map(|(look, &w)| Some((w.min(1.0), look.logit?)));
-        self.model.scores = Some(Mixture::of(judged, &scores));
+        for (look, rest) in self.looks.iter().zip(&unowned) {
+            if let Some(logit) = look.logit {
+                clutter.add(rest.max(0.0), logit);
+            }
+        }
+        let (object_mean, clutter_mean) = (object.mean(), clutter.mean());
+        let scatter = object.scatter() + clutter.scatter() + SCORE_COUNT * scores.variance;
+        let variance = scatter / (object.n + clutter.n - SCORE_COUNT);
+        self.model.scores = Some(Scores {
+            object: object_mean,
+            clutter: clutter_mean,
+            variance: variance.max(LEAST_SCORE_VARIANCE),
+        });
     }
 
     /// Hits and misses of real objects that other views saw too: leaving the view itself out of the
