@@ -7,8 +7,10 @@ use super::data::Look;
 pub(super) const CONTAMINATION: f64 = 0.03;
 /// How many times their variance.
 pub(super) const WIDE: f64 = 25.0;
-/// A border cuts this share of a box's width, and of its height, one standard deviation.
-const CUT_SHARES: (f64, f64) = (0.5, 0.5);
+/// How uncertain the mark of a box is that a border cuts, one standard deviation as a share of its
+/// size: along the side that is cut, and along the other, since what is left of an object need not
+/// reach as far up and down as the whole.
+const CUT_SHARES: (f64, f64) = (0.5, 0.2);
 /// And this of the logarithm of its size.
 const CUT_LOG_SIZE: f64 = 0.5;
 
@@ -31,13 +33,10 @@ pub(super) fn variances(look: &Look, scales: &Scales, shape: f64) -> [f64; 4] {
         let own = (shape * px * scale).powi(2);
         r[0] += own;
         r[1] += own * 0.25;
-        if look.cut.across {
-            r[0] += (CUT_SHARES.0 * px).powi(2);
-        }
-        if look.cut.down {
-            r[1] += (CUT_SHARES.1 * px).powi(2);
-        }
-        if look.is_size_cut {
+        if look.cut.is_any() {
+            let share = |is_cut| if is_cut { CUT_SHARES.0 } else { CUT_SHARES.1 };
+            r[0] += (share(look.cut.across) * px).powi(2);
+            r[1] += (share(look.cut.down) * px).powi(2);
             r[2] += CUT_LOG_SIZE * CUT_LOG_SIZE;
         }
     }
