@@ -3,8 +3,9 @@
     in_qgis.py OUTPUTS PICTURE.png
 
 Checks that each layer file and each layer of the GeoPackage loads with the features, the geometry
-type and the coordinate reference system that run.json's site and the GeoJSON layers have, that the
-styles are applied by themselves, and that the project finds its files in another folder.
+type and the coordinate reference system that run.json's site and the GeoJSON layers have, or in
+that of output.crs at the place of the GeoJSON layers; that the styles are applied by themselves,
+and that the project finds its files in another folder.
 """
 
 import json
@@ -19,6 +20,7 @@ os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.mkdtemp())
 
 from qgis.core import (  # noqa: E402
     QgsApplication,
+    QgsCoordinateTransform,
     QgsMapRendererParallelJob,
     QgsMapSettings,
     QgsProject,
@@ -48,7 +50,7 @@ def expect(what, found, expected):
         raise Fault(f"{what}: found {found!r}, expected {expected!r}")
 
 
-def check_layer(shown, layer, name, count, body):
+def check_layer(shown, layer, name, count, body, crs_asked=None):
     expect(f"{shown}: is valid", layer.isValid(), True)
     expect(f"{shown}: features", layer.featureCount(), count)
     if count or "gpkg" in shown:
@@ -56,11 +58,16 @@ def check_layer(shown, layer, name, count, body):
     crs = layer.crs()
     if shown.endswith(".geojson") and body != "earth" and not crs.isValid():
         return  # An older QGIS does not know the system by its name, and claims none.
-    expect(f"{shown}: geographic", crs.isGeographic(), True)
     wkt = crs.toWkt()
+    if crs_asked is not None and not shown.endswith(".geojson"):
+        expect(f"{shown}: geographic", crs.isGeographic(), False)
+        if body == "earth":
+            expect(f"{shown}: crs", crs.authid(), crs_asked)
+    else:
+        expect(f"{shown}: geographic", crs.isGeographic(), True)
     if str(int(RADIUS[body])) not in wkt:
         raise Fault(f"{shown}: found {wkt}, expected the system of the {body}")
-    if body == "earth":
+    if body == "earth" and crs.isGeographic():
         expect(f"{shown}: crs", crs.authid(), "EPSG:4326")
 
 
@@ -79,7 +86,28 @@ def legend(layer):
     return [(item.label(), item.symbol().color().name(), item.symbol().dump()) for item in items]
 
 
-def check_files(folder, body, counts):
+def check_box(shown, layer, folder):
+    """The layer lies where QGIS takes the GeoJSON layer of its name to, within a millimetre or two."""
+    if layer.featureCount() == 0:
+        return
+    plain = QgsVectorLayer(str(folder / f"{layer.name()}.geojson"), "plain", "ogr")
+    if not plain.crs().isValid():
+        return  # An older QGIS does not know the body's system in GeoJSON.
+    there = QgsCoordinateTransform(plain.crs(), layer.crs(), QgsProject.instance())
+    places = [f.geometry() for f in plain.getFeatures() if f.hasGeometry()]
+    for place in places:
+        place.transform(there)
+    wanted = places[0].boundingBox()
+    for place in places[1:]:
+        wanted.combineExtentWith(place.boundingBox())
+    found = layer.extent()
+    for side in ("xMinimum", "xMaximum", "yMinimum", "yMaximum"):
+        off = getattr(found, side)() - getattr(wanted, side)()
+        if abs(off) > 0.002:
+            raise Fault(f"{shown}: {side} found {off:+.4f} m off that of the GeoJSON layer")
+
+
+def check_files(folder, body, counts, crs_asked):
     for path in sorted(folder.iterdir()):
         if path.suffix not in (".geojson", ".fgb"):
             continue
@@ -89,26 +117,34 @@ def check_files(folder, body, counts):
             # GeoJSON without features has no columns, and QGIS takes it for a table.
             expect(f"{path.name}: is valid", layer.isValid(), True)
             continue
-        check_layer(path.name, layer, name, counts[name], body)
+        check_layer(path.name, layer, name, counts[name], body, crs_asked)
+        if crs_asked is not None:
+            check_box(path.name, layer, folder)
         check_style(path.name, layer, path.with_suffix(".qml"))
         print(f"{path.name:32} {layer.featureCount():6}  {layer.renderer().type()}")
     for name, count in counts.items():
         source = f"{folder / 'rockmap.gpkg'}|layername={name}"
         layer = QgsVectorLayer(source, name, "ogr")
-        check_layer(f"rockmap.gpkg {name}", layer, name, count, body)
+        check_layer(f"rockmap.gpkg {name}", layer, name, count, body, crs_asked)
+        if crs_asked is not None:
+            check_box(f"rockmap.gpkg {name}", layer, folder)
         check_style(f"rockmap.gpkg {name}", layer, folder / f"{name}.qml")
         print(f"{'rockmap.gpkg ' + name:32} {layer.featureCount():6}  {layer.renderer().type()}")
 
 
-def check_tables(folder, counts):
+def check_tables(folder, counts, crs_asked):
     """Tables with places open as layers, too, by the columns the documentation names."""
     for name, count in counts.items():
         path = folder / f"{name}.csv"
         if not path.exists() or count == 0:
             continue
         is_point = GEOMETRY[name] == QgsWkbTypes.PointGeometry
-        columns = "xField=lon_deg&yField=lat_deg" if is_point else "wktField=wkt"
-        source = f"{path.as_uri()}?type=csv&{columns}&crs=EPSG:4326&detectTypes=yes"
+        points = "xField=lon_deg&yField=lat_deg"
+        if crs_asked is not None:
+            points = "xField=easting_m&yField=northing_m"
+        columns = points if is_point else "wktField=wkt"
+        crs = crs_asked or "EPSG:4326"
+        source = f"{path.as_uri()}?type=csv&{columns}&crs={crs}&detectTypes=yes"
         layer = QgsVectorLayer(source, name, "delimitedtext")
         expect(f"{path.name}: is valid", layer.isValid(), True)
         placed = [f for f in layer.getFeatures() if f.hasGeometry()]
@@ -200,13 +236,14 @@ def main(outputs, picture):
         with tempfile.TemporaryDirectory() as elsewhere:
             folder = Path(elsewhere) / "moved"
             shutil.copytree(outputs, folder, ignore=shutil.ignore_patterns("annotated"))
-            body = json.loads((folder / "run.json").read_text())["site"]["body"]
+            run = json.loads((folder / "run.json").read_text())
+            body, crs_asked = run["site"]["body"], run["config"]["output"].get("crs")
             counts = {
                 path.stem: len(json.loads(path.read_text())["features"])
                 for path in sorted(folder.glob("*.geojson"))
             }
-            check_files(folder, body, counts)
-            check_tables(folder, counts)
+            check_files(folder, body, counts, crs_asked)
+            check_tables(folder, counts, crs_asked)
             check_project(folder, counts, picture)
             QgsProject.instance().clear()
     except Fault as fault:

@@ -192,6 +192,21 @@ fn geopackages_compare_as_geojson_does() {
         assert_eq!(other["b"]["footprints"], true);
     }
     assert!(of_text["counts"]["same"].as_u64() > Some(5), "{of_text}");
+    // In another system they are where they were, to its last decimal.
+    let projected = run(
+        "projected",
+        &[
+            "output.formats=[\"gpkg\"]",
+            "output.crs=\"EPSG:32719\"",
+            paper,
+            "output.report=false",
+        ],
+    );
+    let (of_projected, _) = compared(&both, &projected, "projected-changes");
+    assert_eq!(of_projected["counts"], of_text["counts"]);
+    assert_eq!(of_projected["b"]["footprints"], true);
+    let rms = |summary: &Value| summary["agreement"]["rms_m"].as_f64().unwrap();
+    assert!((rms(&of_projected) - rms(&of_text)).abs() < 2e-4);
 
     // With the later run's report, its page with a section more; without, a page of that alone.
     assert!(report.contains("<h1>tiny</h1>") && report.contains("id=\"map\""));

@@ -11,8 +11,14 @@ use crate::camera::{
 use crate::error::Error;
 use crate::input::Table;
 
+const EXAMPLES: &str = "Examples:
+  rockmap camera list fixtures/tiny/cameras.toml
+  printf 'u_px,v_px\\n160,120\\n' | rockmap camera rays fixtures/tiny/cameras.toml
+  rockmap camera pixels cameras.toml --camera mast --input points.csv --output pixels.csv";
+
 /// What `rockmap camera` takes.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     #[command(subcommand)]
     question: Question,

@@ -7,8 +7,14 @@ use crate::error::{Error, Fault, Place};
 use crate::frame::{Body, Enu, Rotation};
 use crate::{camera, import};
 
+const EXAMPLES: &str = "Examples:
+  rockmap import calibration.yaml --to night            a calibration of ROS, Kalibr or OpenCV
+  rockmap import sparse/cameras.txt sparse/images.txt --to night
+  rockmap import labels/*.LBL --to sol-17 --force       pictures of a rover, with their poses";
+
 /// What `rockmap import` takes.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// Calibrations, reconstructions, labels or JSON of rover pictures
     #[arg(value_name = "FILE", required = true)]

@@ -7,9 +7,12 @@ use rusqlite::{Connection, OpenFlags, OptionalExtension as _, Row};
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Fault, Place};
+use crate::frame::{Crs, CrsError, Geodetic, Planet};
 
 /// A layer of a `GeoPackage` as the text of a GeoJSON file: the one of this name, or where there is
 /// none, with `kind`, the first of this type of geometry; `None` where there is none of it either.
+///
+/// Places on a map projection are taken to the latitudes and longitudes of its planet.
 ///
 /// # Errors
 /// What is no `GeoPackage`, a system without a code, a geometry that is no point and no polygon.
@@ -36,21 +39,15 @@ pub(super) fn layer(path: &Path, name: &str, kind: Option<&str>) -> Result<Optio
     let Some(table) = table(&db, name, kind).map_err(failed)? else {
         return Ok(None);
     };
-    let crs = match (table.authority.to_ascii_uppercase().as_str(), table.code) {
-        ("EPSG", 4326 | 4979) => None,
-        (authority, code) if authority.starts_with("IAU") => {
-            let name = format!("urn:ogc:def:crs:IAU:2015:{code}");
-            Some(json!({ "type": "name", "properties": { "name": name } }))
-        }
-        (authority, code) => {
-            let found = format!("the system {authority}:{code}");
-            return Err(fault(found, "EPSG:4326 or IAU_2015:<code>"));
-        }
+    let Some(system) = System::of(&table.authority, table.code) else {
+        let found = format!("the system {}:{}", table.authority, table.code);
+        let expected = "a system of EPSG on Earth or of IAU_2015 that PROJ knows";
+        return Err(fault(found, expected));
     };
     let mut features = Vec::new();
     for row in rows(&db, &table).map_err(failed)? {
         let (properties, blob) = row;
-        let geometry = match blob {
+        let mut geometry = match blob {
             None => Value::Null,
             Some(blob) => geometry(&blob).ok_or_else(|| {
                 fault(
@@ -59,13 +56,89 @@ pub(super) fn layer(path: &Path, name: &str, kind: Option<&str>) -> Result<Optio
                 )
             })?,
         };
+        if let (Some(map), Some(coordinates)) = (&system.map, geometry.get_mut("coordinates")) {
+            let off_map = |e: CrsError| fault(e.to_string(), "places of its system");
+            off_the_map(map, system.planet, coordinates).map_err(off_map)?;
+        }
         features.push(json!({ "type": "Feature", "geometry": geometry, "properties": properties }));
     }
     let mut root = json!({ "type": "FeatureCollection", "features": features });
-    if let Some(crs) = crs {
-        root["crs"] = crs;
+    if let Some(name) = system.name {
+        root["crs"] = json!({ "type": "name", "properties": { "name": name } });
     }
     Ok(Some(root.to_string()))
+}
+
+/// What the code of a layer's system stands for.
+struct System {
+    /// The name its planet's latitudes and longitudes have in GeoJSON; none on Earth.
+    name: Option<String>,
+    planet: Planet,
+    /// The map projection, where places are not latitudes and longitudes already.
+    map: Option<Crs>,
+}
+
+impl System {
+    fn of(authority: &str, code: i64) -> Option<Self> {
+        let authority = authority.to_ascii_uppercase();
+        let urn = |code: i64| Some(format!("urn:ogc:def:crs:IAU:2015:{code}"));
+        if authority == "EPSG" {
+            let map = match code {
+                4326 | 4979 => None,
+                _ => Some(Crs::for_map(&format!("EPSG:{code}"), Planet::EARTH).ok()?),
+            };
+            return Some(Self {
+                name: None,
+                planet: Planet::EARTH,
+                map,
+            });
+        }
+        if !authority.starts_with("IAU") {
+            return None;
+        }
+        let named = |code: i64| Planet::named(&format!("IAU_2015:{code}"));
+        if let Some(planet) = named(code) {
+            return Some(Self {
+                name: urn(code),
+                planet,
+                map: None,
+            });
+        }
+        // Codes are a body's number and two digits, the sphere's own system the first of them.
+        let sphere = code / 100 * 100;
+        let planet = named(sphere)?.eastward();
+        let map = Crs::for_map(&format!("IAU_2015:{code}"), planet).ok()?;
+        Some(Self {
+            name: urn(sphere),
+            planet,
+            map: Some(map),
+        })
+    }
+}
+
+/// Positions of a map, at whatever depth, as longitudes and latitudes in degrees.
+fn off_the_map(map: &Crs, planet: Planet, coordinates: &mut Value) -> Result<(), CrsError> {
+    let Some(parts) = coordinates.as_array_mut() else {
+        return Ok(());
+    };
+    let position = match &parts[..] {
+        [x, y] => x.as_f64().zip(y.as_f64()),
+        _ => None,
+    };
+    if let Some((x, y)) = position {
+        let (lon, lat) = map.lon_lat(x, y)?;
+        let place = Geodetic {
+            lat,
+            lon,
+            height_m: 0.0,
+        };
+        let (lat_deg, lon_deg) = planet.lat_lon_deg(place);
+        *coordinates = json!([lon_deg, lat_deg]);
+        return Ok(());
+    }
+    parts
+        .iter_mut()
+        .try_for_each(|part| off_the_map(map, planet, part))
 }
 
 /// Where a layer is, and in which system.
@@ -253,6 +326,26 @@ mod tests {
         assert_eq!(geometry(b"PG\0\x01"), None);
         let line = [1, 2, 0, 0, 0, 0, 0, 0, 0];
         assert_eq!(geometry(&blob(1, 0, &line)), None);
+    }
+
+    #[test]
+    fn systems_are_known_by_their_codes() {
+        let plain = System::of("epsg", 4326).unwrap();
+        assert!(plain.map.is_none() && plain.name.is_none());
+        let mars = System::of("IAU_2015", 49910).unwrap();
+        assert_eq!(mars.name.unwrap(), "urn:ogc:def:crs:IAU:2015:49900");
+        // Equirectangular on a sphere of 3396190 m: lengths are angles.
+        let degree = 3_396_190_f64.to_radians();
+        let mut ring = json!([[[degree, 2.0 * degree], [-degree, 0.0]]]);
+        off_the_map(&mars.map.unwrap(), mars.planet, &mut ring).unwrap();
+        for (at, expected) in [(&ring[0][0], [1.0, 2.0]), (&ring[0][1], [-1.0, 0.0])] {
+            for (found, expected) in at.as_array().unwrap().iter().zip(expected) {
+                assert!((found.as_f64().unwrap() - expected).abs() < 1e-12, "{ring}");
+            }
+        }
+        for (authority, code) in [("NONE", -1), ("EPSG", 1), ("EPSG", 5773), ("IAU_2015", 7)] {
+            assert!(System::of(authority, code).is_none(), "{authority}:{code}");
+        }
     }
 
     #[test]

@@ -106,8 +106,11 @@ fn believed(
             ..settings(config)
         };
         let belief = fuse_belief(&problem, &settings);
-        let n = belief.objects.iter().filter(|o| o.p_exist >= 0.5).count();
-        observer.end(&format!("{n} objects"));
+        let at_least = |p| belief.objects.iter().filter(|o| o.p_exist >= p).count();
+        let (n, likely) = (at_least(config.output.min_exist), at_least(0.5));
+        observer.end(&format!(
+            "{n} objects, {likely} of them more likely real than not"
+        ));
         Ok(belief)
     })?;
     let views = corrected(&inputs.views, &belief);
