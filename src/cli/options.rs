@@ -21,7 +21,7 @@ pub(super) struct PipelineArgs {
     /// Override a key of the pipeline file; may be given several times
     #[arg(long, value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
-    /// Fusion method, as --set fusion.method=METHOD
+    /// Fusion method (belief, em or paper), as --set fusion.method=METHOD
     #[arg(long, value_name = "METHOD")]
     method: Option<String>,
     /// Threads to work with; as many as the machine has if not given
