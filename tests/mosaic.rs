@@ -31,6 +31,8 @@ struct Read {
     scale_m: f64,
     west_m: f64,
     north_m: f64,
+    /// The code of EPSG of its system.
+    code: u16,
 }
 
 impl Read {
@@ -39,6 +41,8 @@ impl Read {
         let (columns, _) = decoder.dimensions().unwrap();
         let scale = decoder.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap();
         let tie = decoder.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap();
+        let keys = decoder.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap();
+        let code = keys.chunks(4).find(|key| key[0] == 3072).unwrap()[3];
         let DecodingResult::U8(rgba) = decoder.read_image().unwrap() else {
             panic!("not bytes");
         };
@@ -48,6 +52,7 @@ impl Read {
             scale_m: scale[0],
             west_m: tie[3],
             north_m: tie[4],
+            code,
         }
     }
 
@@ -110,22 +115,27 @@ fn spots_on_the_ground_lie_within_a_pixel_of_their_places() {
             .write(&view.picture.as_ref().unwrap().path, 98)
             .unwrap();
     }
-    let set = [
+    let mut set = vec![
         "output.mosaic=true",
         "output.mosaic_m_per_px=0.02",
         "output.annotate=false",
         // The spots are painted as the poses are stated; they shall stay so.
         "fusion.pose_correction=\"off\"",
     ];
-    pipeline::run(&config(&set), false, &Silent).unwrap();
-    let mosaic = Read::of(&home.path().join("map/mosaic.tif"));
-    let utm = Crs::new("EPSG:32719", Planet::EARTH).unwrap();
-    for spot in spots {
-        let place = inputs.site.geodetic(spot);
-        let (x, y) = utm.xy(place.lon, place.lat).unwrap();
-        let (found_x, found_y, n) = mosaic.middle_of_red((x, y));
-        assert!(n > 40, "{n} pixels of the spot at {:?}", spot.xyz);
-        let off_m = (found_x - x).hypot(found_y - y);
-        assert!(off_m < mosaic.scale_m, "{off_m} m at {:?}", spot.xyz);
+    // The site's own zone, and a neighbouring one that the run asks for, whose north is turned by degrees.
+    for (code, crs) in [(32719, None), (32718, Some("output.crs=\"EPSG:32718\""))] {
+        set.extend(crs);
+        pipeline::run(&config(&set), true, &Silent).unwrap();
+        let mosaic = Read::of(&home.path().join("map/mosaic.tif"));
+        assert_eq!(mosaic.code, code);
+        let map = Crs::new(&format!("EPSG:{code}"), Planet::EARTH).unwrap();
+        for spot in &spots {
+            let place = inputs.site.geodetic(*spot);
+            let (x, y) = map.xy(place.lon, place.lat).unwrap();
+            let (found_x, found_y, n) = mosaic.middle_of_red((x, y));
+            assert!(n > 40, "{n} pixels of the spot at {:?}", spot.xyz);
+            let off_m = (found_x - x).hypot(found_y - y);
+            assert!(off_m < mosaic.scale_m, "{off_m} m at {:?}", spot.xyz);
+        }
     }
 }

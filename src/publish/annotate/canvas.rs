@@ -3,7 +3,7 @@
 use super::curve::{self, Curve};
 use super::fill;
 use super::grid::whole;
-use super::stencil::{Stencil, TILE, Tile};
+use super::stencil::{Stencil, TILE};
 use super::style::{Colour, Frame, Line};
 use crate::publish::picture::Picture;
 
@@ -17,6 +17,8 @@ const MAX_CIRCLE_RADIUS: f64 = 4096.0;
 pub(super) struct Canvas<'a> {
     picture: &'a mut Picture,
     stencil: Stencil,
+    /// Those that have drawn: few lines differ.
+    pens: Vec<Pen>,
 }
 
 /// Coverage of a rectangle of pixels, 0 to 255, at a column and row that may lie outside.
@@ -32,6 +34,7 @@ impl<'a> Canvas<'a> {
         Self {
             stencil: Stencil::new(picture.width(), picture.height()),
             picture,
+            pens: Vec::new(),
         }
     }
 
@@ -125,10 +128,10 @@ impl<'a> Canvas<'a> {
             .chunks_exact(stamp.width)
             .skip(cut(stamp.row));
         for (line, row) in lines.zip(pixels.chunks_exact_mut(row_bytes).skip(top)) {
-            let below = row[left * 4..].chunks_exact_mut(4);
+            let (below, _) = row[left * 4..].as_chunks_mut::<4>();
             for (&coverage, pixel) in line.iter().skip(cut(stamp.column)).zip(below) {
                 if coverage > 0 {
-                    let alpha = u64::from(coverage) * u64::from(colour.alpha);
+                    let alpha = u32::from(coverage) * u32::from(colour.alpha);
                     Mix::over(colour.rgb, (alpha * 256 + 32_512) / 65_025).apply(pixel);
                 }
             }
@@ -142,12 +145,17 @@ impl<'a> Canvas<'a> {
             self.picture.height() as usize,
         );
         let pixels = self.picture.rgba_mut();
-        let pen = Pen::new(line);
+        let known = self.pens.iter().position(|pen| pen.line == *line);
+        let number = known.unwrap_or_else(|| {
+            self.pens.push(Pen::new(line));
+            self.pens.len() - 1
+        });
+        let pen = &self.pens[number];
         for tile in self.stencil.tiles() {
             let columns = TILE.min(width - tile.column);
-            for row in 0..TILE.min(height - tile.row) {
+            for (row, squares) in tile.lines().filter(|(row, _)| tile.row + row < height) {
                 let start = ((tile.row + row) * width + tile.column) * 4;
-                pen.ink(&mut pixels[start..start + columns * 4], tile, row);
+                pen.ink(&mut pixels[start..start + columns * 4], squares);
             }
         }
         self.stencil.clear();
@@ -156,44 +164,58 @@ impl<'a> Canvas<'a> {
 
 /// What a line does to a pixel at each distance from its middle.
 struct Pen {
+    line: Line,
     reach_square: f32,
     /// Entries a pixel of distance.
     scale: f32,
     mixes: Vec<Mix>,
 }
 
-/// `below * keep + add`, in 256ths, the three channels side by side in one number, 16 bits each:
-/// a channel is at most 255 x 256 + 254, so that none runs over into the next.
+/// `below * keep + add`, in 256ths, two channels side by side in one number, 16 bits each:
+/// a channel is at most 255 x 256 + 127, so that none runs over into the next.
 #[derive(Debug, Clone, Copy)]
 struct Mix {
-    keep: u64,
-    add: u64,
+    keep: u32,
+    /// To red and blue.
+    red_blue: u32,
+    /// To green and opacity, which stays whole.
+    green: u32,
 }
 
 impl Mix {
-    /// What leaves a pixel as it is, but for the half that rounds.
-    const ROUND: u64 = 0x007f_007f_007f;
+    const EVERY_OTHER: u32 = 0x00ff_00ff;
+    /// What rounds.
+    const HALVES: u32 = 0x007f_007f;
 
-    /// A colour laid over, by so many 256ths.
-    fn over(rgb: [u8; 3], share: u64) -> Self {
+    /// Keeps so many 256ths of what is below, and adds red, green and blue, 256ths too.
+    fn new(keep: u32, [r, g, b]: [u32; 3]) -> Self {
         Self {
-            keep: 256 - share,
-            add: spread(rgb).wrapping_mul(share).wrapping_add(Self::ROUND),
+            keep,
+            red_blue: (r | (b << 16)) + Self::HALVES,
+            green: (g | ((256 - keep) * 255) << 16) + Self::HALVES,
         }
     }
 
-    fn apply(self, pixel: &mut [u8]) {
-        let [r, g, b, _] = pixel else { return };
+    /// A colour laid over, by so many 256ths.
+    fn over([r, g, b]: [u8; 3], share: u32) -> Self {
+        let pair = |low: u8, high: u8| u32::from(low) | u32::from(high) << 16;
         // Wrapping, because checks for an overflow that cannot be cost time here.
-        let sum = spread([*r, *g, *b])
-            .wrapping_mul(self.keep)
-            .wrapping_add(self.add);
-        [_, *r, _, *g, _, *b, _, _] = sum.to_le_bytes();
+        let add = |pair: u32| pair.wrapping_mul(share).wrapping_add(Self::HALVES);
+        Self {
+            keep: 256 - share,
+            red_blue: add(pair(r, b)),
+            green: add(pair(g, 255)),
+        }
     }
-}
 
-fn spread([r, g, b]: [u8; 3]) -> u64 {
-    u64::from_le_bytes([r, 0, g, 0, b, 0, 0, 0])
+    fn apply(self, pixel: &mut [u8; 4]) {
+        let below = u32::from_le_bytes(*pixel);
+        // Wrapping, because checks for an overflow that cannot be cost time here.
+        let mix = |channels: u32, add: u32| channels.wrapping_mul(self.keep).wrapping_add(add);
+        let red_blue = mix(below & Self::EVERY_OTHER, self.red_blue) >> 8;
+        let green = mix(below >> 8 & Self::EVERY_OTHER, self.green);
+        *pixel = (red_blue & Self::EVERY_OTHER | green & !Self::EVERY_OTHER).to_le_bytes();
+    }
 }
 
 impl Pen {
@@ -218,43 +240,45 @@ impl Pen {
                 }
             }
             let keep = share(keep, 256.0);
-            let add = add.map(|sum| share(sum, 256.0).min((256 - keep) * 255));
-            Mix {
+            Mix::new(
                 keep,
-                add: (add[0] | add[1] << 16 | add[2] << 32) + Mix::ROUND,
-            }
+                add.map(|sum| share(sum, 256.0).min((256 - keep) * 255)),
+            )
         });
+        // Beyond the reach everything is kept.
+        let mixes = mixes.chain([Mix::new(256, [0; 3])]);
         Self {
+            line: *line,
             reach_square: narrow(reach * reach),
             scale: narrow(f64::from(Self::STEPS) / reach),
             mixes: mixes.collect(),
         }
     }
 
-    fn ink(&self, pixels: &mut [u8], tile: &Tile, row: usize) {
-        let squares = &tile.squares[row * TILE..(row + 1) * TILE];
-        // Most rows of most tiles have no line: that is found out without a branch for each pixel.
-        let near = squares
-            .iter()
-            .fold(false, |near, &square| near | (square < self.reach_square));
-        if !near {
-            return;
-        }
-        // The square roots without a branch, many at once; beyond the reach lies no entry.
-        let mut entries = [0; TILE];
-        for (entry, &square) in entries.iter_mut().zip(squares) {
-            let square = if square < self.reach_square {
-                square
-            } else {
-                self.reach_square
-            };
-            // Wrapping, because a check for an overflow that cannot be would forbid to do many at once.
-            let rounded = (square.sqrt() * self.scale + WHOLE).to_bits();
-            *entry = rounded.wrapping_sub(WHOLE.to_bits());
-        }
-        for (pixel, entry) in pixels.chunks_exact_mut(4).zip(entries) {
-            if let Some(mix) = self.mixes.get(entry as usize) {
-                mix.apply(pixel);
+    fn ink(&self, pixels: &mut [u8], squares: &[f32; TILE]) {
+        // By fours, which most lines leave out or cover, so that few branches are guessed wrong.
+        let (pixels, _) = pixels.as_chunks_mut::<4>();
+        let (fours, _) = squares.as_chunks::<4>();
+        for (pixels, squares) in pixels.chunks_mut(4).zip(fours) {
+            let is_near = squares.map(|square| square < self.reach_square);
+            if is_near == [false; 4] {
+                continue;
+            }
+            // The square roots without a branch, many at once; beyond the reach lies the last entry.
+            let entries = squares.map(|square| {
+                let square = if square < self.reach_square {
+                    square
+                } else {
+                    self.reach_square
+                };
+                // Wrapping, because a check for an overflow that cannot be would forbid that.
+                let rounded = (square.sqrt() * self.scale + WHOLE).to_bits();
+                rounded.wrapping_sub(WHOLE.to_bits())
+            });
+            for (pixel, entry) in pixels.iter_mut().zip(entries) {
+                if let Some(mix) = self.mixes.get(entry as usize) {
+                    mix.apply(pixel);
+                }
             }
         }
     }
@@ -273,12 +297,12 @@ pub(super) fn narrow(value: f64) -> f32 {
 }
 
 /// A share as so many of a whole, rounded.
-fn share(value: f64, whole_share: f64) -> u64 {
-    whole(value * whole_share + 0.5) as u64
+fn share(value: f64, whole_share: f64) -> u32 {
+    u32::try_from(whole(value * whole_share + 0.5)).unwrap_or(u32::MAX)
 }
 
 /// Lays a colour over a run of pixels, in arithmetic that the compiler can do on many at once.
-fn mix_run(run: &mut [u8], [r, g, b]: [u8; 3], alpha: u64) {
+fn mix_run(run: &mut [u8], [r, g, b]: [u8; 3], alpha: u32) {
     let alpha = u16::try_from(alpha).unwrap_or(255).min(255);
     let keep = 255 - alpha;
     let add = [r, g, b, 255].map(|above| u16::from(above) * alpha + 128);
@@ -344,7 +368,7 @@ mod tests {
                 let mut pixel = [below, 255 - below, below, 255];
                 let before = pixel;
                 let above = [255, 255, 0];
-                Mix::over(above, u64::from(share)).apply(&mut pixel);
+                Mix::over(above, u32::from(share)).apply(&mut pixel);
                 let weight = f64::from(share) / 256.0;
                 for i in 0..3 {
                     let exact =
@@ -361,7 +385,7 @@ mod tests {
         for alpha in [0u16, 1, 60, 128, 254, 255] {
             for below in 0..=255u8 {
                 let mut run = [below, below, below, 255].repeat(7);
-                mix_run(&mut run, [0, 86, 255], u64::from(alpha));
+                mix_run(&mut run, [0, 86, 255], u32::from(alpha));
                 let exact = [0u32, 86, 255].map(|above| {
                     let alpha = u32::from(alpha);
                     let sum = u32::from(below) * (255 - alpha) + above * alpha;

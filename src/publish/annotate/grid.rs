@@ -66,11 +66,13 @@ impl Grid {
     /// How much of a rectangle is crossed, in cells, or `None` where some of it is taken.
     pub(super) fn cost(&self, frame: Frame) -> Option<usize> {
         let mut crossed = 0;
-        for cell in self.inside(frame) {
-            match cell {
-                Use::Free => {}
-                Use::Crossed => crossed += 1,
-                Use::Taken => return None,
+        for cells in self.inside(frame) {
+            for cell in cells {
+                match cell {
+                    Use::Free => {}
+                    Use::Crossed => crossed += 1,
+                    Use::Taken => return None,
+                }
             }
         }
         Some(crossed)
@@ -78,13 +80,14 @@ impl Grid {
 
     /// How much of a rectangle is not free, in cells.
     pub(super) fn crowd(&self, frame: Frame) -> usize {
-        self.inside(frame).filter(|&cell| cell != Use::Free).count()
+        let not_free = |cells: &[Use]| cells.iter().filter(|&&cell| cell != Use::Free).count();
+        self.inside(frame).map(not_free).sum()
     }
 
-    fn inside(&self, frame: Frame) -> impl Iterator<Item = Use> + '_ {
+    /// The cells of a rectangle, row by row.
+    fn inside(&self, frame: Frame) -> impl Iterator<Item = &[Use]> {
         let (columns, rows) = self.span(frame);
-        rows.flat_map(move |row| &self.cells[row * self.columns..][columns.clone()])
-            .copied()
+        rows.map(move |row| &self.cells[row * self.columns..][columns.clone()])
     }
 
     fn points(&mut self, points: &[[f64; 2]], how: Use) {
@@ -99,21 +102,24 @@ impl Grid {
             if Frame::about(&[from, to]).is_none_or(|about| !about.meets(&view)) {
                 continue;
             }
-            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+            let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+            let length = (dx * dx + dy * dy).sqrt();
             let steps = (length / self.cell).ceil().max(1.0);
             let mut step = 0.0;
             while step < steps {
-                let [x, y] = [0, 1].map(|i| from[i] + (to[i] - from[i]) * step / steps);
-                let spot = Frame {
-                    left: x,
-                    top: y,
-                    right: x,
-                    bottom: y,
-                };
-                if view.meets(&spot) {
-                    self.put(spot, how);
-                }
+                let share = step / steps;
+                self.put_at([from[0] + dx * share, from[1] + dy * share], how);
                 step += 1.0;
+            }
+        }
+    }
+
+    fn put_at(&mut self, at: [f64; 2], how: Use) {
+        if at[0] >= 0.0 && at[1] >= 0.0 {
+            let [column, row] = at.map(|x| whole((x + 0.5) / self.cell));
+            if column < self.columns && row < self.rows {
+                let cell = &mut self.cells[row * self.columns + column];
+                *cell = how.max(*cell);
             }
         }
     }

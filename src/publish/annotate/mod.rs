@@ -41,8 +41,8 @@ use marks::Marks;
 use style::Style;
 use text::Typesetter;
 
-/// What drawings look like: raised whenever the same annotation comes to give other pixels.
-pub const DRAWING: u32 = 1;
+/// What drawings look like: raised whenever the same picture and annotation come to give another file.
+pub const DRAWING: u32 = 2;
 
 /// What is drawn on one picture. Everything may lie partly or wholly outside of it.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -19,14 +19,18 @@ pub(super) struct Stencil {
     across: usize,
     /// For each tile of the picture, one more than its number in `tiles`, or 0.
     numbers: Vec<u32>,
+    /// Those in use, and behind them those that were and can be again.
     tiles: Vec<Tile>,
+    n_tiles: usize,
 }
 
 /// The squared distances of one tile, rows from the top.
 pub(super) struct Tile {
     pub(super) column: usize,
     pub(super) row: usize,
-    pub(super) squares: [f32; TILE * TILE],
+    /// A bit for each row that a line has come near to; the others hold no distances.
+    near: u16,
+    squares: [[f32; TILE]; TILE],
 }
 
 impl Stencil {
@@ -40,6 +44,7 @@ impl Stencil {
             across,
             numbers: vec![0; across * height.div_ceil(TILE)],
             tiles: Vec::new(),
+            n_tiles: 0,
         }
     }
 
@@ -86,8 +91,7 @@ impl Stencil {
             for start in (columns.start / TILE * TILE..columns.end).step_by(TILE) {
                 let tile = self.tile(start, top);
                 for row in rows.clone() {
-                    let line = (row - top) * TILE;
-                    run.lower((start, row), &mut tile.squares[line..line + TILE]);
+                    run.lower((start, row), tile.line_mut(row - top));
                 }
             }
         }
@@ -115,15 +119,15 @@ impl Stencil {
 
     /// The tiles that lines have come near to.
     pub(super) fn tiles(&self) -> &[Tile] {
-        &self.tiles
+        &self.tiles[..self.n_tiles]
     }
 
     /// Forgets all lines.
     pub(super) fn clear(&mut self) {
-        for tile in &self.tiles {
+        for tile in &self.tiles[..self.n_tiles] {
             self.numbers[tile.row / TILE * self.across + tile.column / TILE] = 0;
         }
-        self.tiles.clear();
+        self.n_tiles = 0;
     }
 
     /// Lowers the distances along a row, in all tiles that the columns touch.
@@ -131,29 +135,52 @@ impl Stencil {
         &mut self,
         row: usize,
         columns: std::ops::Range<usize>,
-        lower: impl Fn(usize, &mut [f32]),
+        lower: impl Fn(usize, &mut [f32; TILE]),
     ) {
         if columns.is_empty() {
             return;
         }
-        let line = (row % TILE) * TILE;
         for start in (columns.start / TILE * TILE..columns.end).step_by(TILE) {
             let tile = self.tile(start, row);
-            lower(start, &mut tile.squares[line..line + TILE]);
+            lower(start, tile.line_mut(row % TILE));
         }
     }
 
     fn tile(&mut self, column: usize, row: usize) -> &mut Tile {
         let number = &mut self.numbers[row / TILE * self.across + column / TILE];
         if *number == 0 {
-            self.tiles.push(Tile {
-                column: column / TILE * TILE,
-                row: row / TILE * TILE,
-                squares: [f32::INFINITY; TILE * TILE],
-            });
-            *number = u32::try_from(self.tiles.len()).unwrap_or(u32::MAX);
+            if self.n_tiles == self.tiles.len() {
+                self.tiles.push(Tile {
+                    column: 0,
+                    row: 0,
+                    near: 0,
+                    squares: [[f32::INFINITY; TILE]; TILE],
+                });
+            }
+            let tile = &mut self.tiles[self.n_tiles];
+            (tile.column, tile.row) = (column / TILE * TILE, row / TILE * TILE);
+            tile.near = 0;
+            self.n_tiles += 1;
+            *number = u32::try_from(self.n_tiles).unwrap_or(u32::MAX);
         }
         &mut self.tiles[*number as usize - 1]
+    }
+}
+
+impl Tile {
+    /// The squared distances of the rows that a line has come near to, each with its row in the tile.
+    pub(super) fn lines(&self) -> impl Iterator<Item = (usize, &[f32; TILE])> {
+        let all = self.squares.iter().enumerate();
+        all.filter(|(row, _)| self.near & (1 << row) != 0)
+    }
+
+    fn line_mut(&mut self, row: usize) -> &mut [f32; TILE] {
+        let line = &mut self.squares[row];
+        if self.near & (1 << row) == 0 {
+            self.near |= 1 << row;
+            *line = [f32::INFINITY; TILE];
+        }
+        line
     }
 }
 
@@ -176,7 +203,7 @@ struct Run {
 impl Run {
     /// Lowers the squared distances of sixteen pixels from a column on: always all of a tile's row,
     /// so that the compiler can do many at once.
-    fn lower(&self, (column, row): (usize, usize), squares: &mut [f32]) {
+    fn lower(&self, (column, row): (usize, usize), squares: &mut [f32; TILE]) {
         let (x, y) = (float(column) - self.from[0], float(row) - self.from[1]);
         let along = narrow(x * self.step.0 + y * self.step.1);
         let across = narrow(x * self.step.1 - y * self.step.0);
@@ -202,7 +229,7 @@ struct Arc {
 
 impl Arc {
     /// As [`Run::lower`].
-    fn lower(&self, column: usize, squares: &mut [f32]) {
+    fn lower(&self, column: usize, squares: &mut [f32; TILE]) {
         let (x, y) = (narrow(float(column) - self.u), narrow(self.y));
         let (y_square, radius) = (y * y, narrow(self.radius));
         for (square, index) in squares.iter_mut().zip(INDICES) {
@@ -237,6 +264,21 @@ fn span(from: f64, to: f64, count: usize) -> std::ops::Range<usize> {
 mod tests {
     use super::*;
 
+    /// Column, row and squared distance of every pixel that a line has come near to.
+    fn squares_of(stencil: &Stencil) -> Vec<(usize, usize, f32)> {
+        let of_tile = |tile: &Tile| {
+            let line = |(row, line): (usize, &[f32; TILE])| {
+                let (x, y) = (tile.column, tile.row + row);
+                line.iter()
+                    .enumerate()
+                    .map(|(i, &square)| (x + i, y, square))
+                    .collect::<Vec<_>>()
+            };
+            tile.lines().flat_map(line).collect::<Vec<_>>()
+        };
+        stencil.tiles().iter().flat_map(of_tile).collect()
+    }
+
     #[test]
     fn distances_are_those_to_the_nearest_segment() {
         let mut stencil = Stencil::new(50, 40);
@@ -256,18 +298,15 @@ mod tests {
             (p[0] - a[0] - share * dx).hypot(p[1] - a[1] - share * dy)
         };
         let mut near = 0;
-        for tile in stencil.tiles() {
-            for (index, &square) in tile.squares.iter().enumerate() {
-                let (x, y) = (tile.column + index % TILE, tile.row + index / TILE);
-                let at = [x, y].map(|v| f64::from(u32::try_from(v).unwrap()));
-                let expected = segments
-                    .map(|s| distance(at, s))
-                    .into_iter()
-                    .fold(f64::INFINITY, f64::min);
-                if x < 50 && y < 40 && expected < 6.0 {
-                    near += 1;
-                    assert!((f64::from(square).sqrt() - expected).abs() < 1e-3, "{at:?}");
-                }
+        for (x, y, square) in squares_of(&stencil) {
+            let at = [x, y].map(|v| f64::from(u32::try_from(v).unwrap()));
+            let expected = segments
+                .map(|s| distance(at, s))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min);
+            if x < 50 && y < 40 && expected < 6.0 {
+                near += 1;
+                assert!((f64::from(square).sqrt() - expected).abs() < 1e-3, "{at:?}");
             }
         }
         let expected_near = (0..40u32)
@@ -289,12 +328,9 @@ mod tests {
             let mut stencil = Stencil::new(50, 40);
             stencil.circle(centre, radius, 3.5);
             let mut squares = vec![f32::INFINITY; 50 * 40];
-            for tile in stencil.tiles() {
-                for (index, &square) in tile.squares.iter().enumerate() {
-                    let (x, y) = (tile.column + index % TILE, tile.row + index / TILE);
-                    if x < 50 && y < 40 {
-                        squares[y * 50 + x] = square;
-                    }
+            for (x, y, square) in squares_of(&stencil) {
+                if x < 50 && y < 40 {
+                    squares[y * 50 + x] = square;
                 }
             }
             let mut near = 0;

@@ -14,7 +14,7 @@ pub use grid::{MosaicGrid, MosaicScale};
 
 use super::{Scene, qgis};
 use crate::error::Error;
-use crate::frame::Crs;
+use crate::frame::{Crs, CrsError, CrsText, Site};
 
 /// A mosaic: red, green, blue, opacity by row from the north-west.
 #[derive(Debug, Clone)]
@@ -25,20 +25,40 @@ pub struct Mosaic {
     pub rgba: Vec<u8>,
 }
 
+/// The system a mosaic is written in: the one that the run asks for, where it is a map of metres
+/// eastwards and northwards with a code of EPSG, by which a GeoTIFF names it; else that of the QGIS project.
+///
+/// # Errors
+/// [`CrsError::Unknown`] of a site whose map projection PROJ does not know.
+pub fn system(site: &Site, wanted: Option<&Crs>) -> Result<Crs, CrsError> {
+    if let Some(wanted) = wanted {
+        let text = CrsText::of(wanted.definition())?;
+        let axes = text.projjson["coordinate_system"]["axis"].as_array();
+        let is_along = |way: &str| axes.is_some_and(|a| a.iter().any(|a| a["direction"] == way));
+        let has_code = text.authority == "EPSG" && u16::try_from(text.code).is_ok();
+        let is_map = wanted.is_projected() && text.is_in_metres;
+        if has_code && is_map && is_along("east") && is_along("north") {
+            return Ok(wanted.clone());
+        }
+    }
+    Crs::new(&qgis::local_crs(site), site.planet())
+}
+
 impl Scene<'_> {
-    /// The mosaic of the scene's pictures, with what kept pictures out of it; `None` where no
-    /// picture shows ground.
+    /// The mosaic of the scene's pictures in a system, with what kept pictures out of it; `None`
+    /// where no picture shows ground.
     ///
     /// # Errors
-    /// A site whose map projection PROJ does not know, or a pixel too small for the site.
-    pub fn mosaic(&self, m_per_px: Option<f64>) -> Result<(Option<Mosaic>, Vec<String>), Error> {
-        let definition = qgis::local_crs(self.site);
-        let crs = Crs::new(&definition, self.site.planet());
-        let crs = crs.map_err(|e| Error::Output(e.to_string()))?;
-        let Some(grid) = grid::choose(self, &crs, m_per_px)? else {
+    /// A pixel too small for the site.
+    pub fn mosaic(
+        &self,
+        crs: &Crs,
+        m_per_px: Option<f64>,
+    ) -> Result<(Option<Mosaic>, Vec<String>), Error> {
+        let Some(grid) = grid::choose(self, crs, m_per_px)? else {
             return Ok((None, Vec::new()));
         };
-        let (mosaic, warnings) = render::render(self, &crs, grid);
+        let (mosaic, warnings) = render::render(self, crs, grid);
         Ok((
             mosaic.rgba.iter().any(|&s| s > 0).then_some(mosaic),
             warnings,

@@ -4,17 +4,14 @@ use std::io::{BufRead, Cursor, ErrorKind, Read, Seek, SeekFrom};
 
 use turbojpeg::{Compressor, Decompressor, Image, PixelFormat, Subsamp};
 
+use super::metadata::Metadata;
 use super::{Format, Picture, PictureError, pixel_count};
 
 /// Marker codes of ISO/IEC 10918-1, table B.1.
 const START_OF_SCAN: u8 = 0xda;
 const END_OF_IMAGE: u8 = 0xd9;
 const APP0: u8 = 0xe0;
-const APP1: u8 = 0xe1;
-const APP2: u8 = 0xe2;
-
-/// What the content of an EXIF segment begins with.
-const EXIF: &[u8] = b"Exif\0\0";
+const APP15: u8 = 0xef;
 
 /// What libjpeg complains of in files that decode as they should.
 const HARMLESS: [&str; 4] = [
@@ -60,11 +57,18 @@ pub(super) fn encode(picture: &Picture, quality: u8) -> Result<Vec<u8>, String> 
         .take_while(|segment| segment.marker == APP0)
         .last()
         .map_or(2, |segment| segment.end);
-    let extra: usize = picture.metadata.iter().map(Vec::len).sum();
+    let segments = picture.metadata.segments();
+    if segments.is_empty() {
+        return Ok(plain);
+    }
+    let extra: usize = segments.iter().map(|(_, content)| content.len() + 4).sum();
     let mut bytes = Vec::with_capacity(plain.len() + extra);
     bytes.extend_from_slice(&plain[..body]);
-    for segment in &picture.metadata {
-        bytes.extend_from_slice(segment);
+    for (number, content) in &segments {
+        let length = u16::try_from(content.len() + 2).map_err(|e| e.to_string())?;
+        bytes.extend([0xff, APP0 + number]);
+        bytes.extend(length.to_be_bytes());
+        bytes.extend_from_slice(content);
     }
     bytes.extend_from_slice(&plain[body..]);
     Ok(bytes)
@@ -141,32 +145,10 @@ pub(super) fn size<R: BufRead + Seek>(file: &mut R) -> Result<(u32, u32), Pictur
     }
 }
 
-/// The segments that any copy of the picture should carry, marker and length included.
-fn metadata(bytes: &[u8]) -> Vec<Vec<u8>> {
-    Segments::new(bytes)
-        .filter(|segment| {
-            let content = &bytes[segment.start + 4..segment.end];
-            match segment.marker {
-                APP1 => {
-                    content.starts_with(b"Exif\0") || content.starts_with(b"http://ns.adobe.com/")
-                }
-                APP2 => content.starts_with(b"ICC_PROFILE\0"),
-                _ => false,
-            }
-        })
-        .map(|segment| bytes[segment.start..segment.end].to_vec())
-        .collect()
-}
-
-/// EXIF, without its name, as a segment of a JPEG, if it fits into one.
-pub(super) fn exif_segment(exif: &[u8]) -> Option<Vec<u8>> {
-    let length = u16::try_from(2 + EXIF.len() + exif.len()).ok()?;
-    Some([&[0xff, APP1], length.to_be_bytes().as_slice(), EXIF, exif].concat())
-}
-
-/// The EXIF that a segment holds, without its name.
-pub(super) fn exif_of(segment: &[u8]) -> Option<&[u8]> {
-    segment.get(4..)?.strip_prefix(EXIF)
+/// What the segments for applications hold.
+fn metadata(bytes: &[u8]) -> Metadata {
+    let segments = Segments::new(bytes).filter(|s| (APP0..=APP15).contains(&s.marker));
+    Metadata::of_jpeg(segments.map(|segment| &bytes[segment.start + 4..segment.end]))
 }
 
 /// One marker segment: from its 0xff to the end of its content.

@@ -2,10 +2,12 @@
 //!
 //! A picture is held as its raw raster. The orientation tag of EXIF is **not** applied: pixel
 //! coordinates of detections and camera models are those of the raster as it was stored, and a
-//! JPEG or PNG that is written again carries the tag on, so that a viewer turns both alike.
+//! picture that is written again carries the tag on, so that a viewer turns both alike.
 
 mod difference;
+mod exif;
 mod jpeg;
+mod metadata;
 mod raster;
 mod reduce;
 
@@ -18,6 +20,7 @@ use serde::Serialize;
 use turbojpeg::Subsamp;
 
 use crate::error::{Error, Fault, Place};
+use metadata::Metadata;
 
 pub use difference::perceptual_difference;
 
@@ -30,8 +33,8 @@ pub struct Picture {
     width: u32,
     height: u32,
     rgba: Vec<u8>,
-    /// What belongs to any copy of the source, as segments of a JPEG: EXIF, XMP, colour profile.
-    metadata: Vec<Vec<u8>>,
+    /// What belongs to any copy of the source: EXIF, XMP, colour profile.
+    metadata: Metadata,
     /// How coarsely the source JPEG had its colour, so that a copy has it as finely.
     colour: Subsamp,
 }
@@ -284,7 +287,7 @@ impl Picture {
             width,
             height,
             rgba,
-            metadata: Vec::new(),
+            metadata: Metadata::default(),
             colour: Subsamp::None,
         }
     }

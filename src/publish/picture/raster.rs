@@ -8,10 +8,14 @@ use image::{
     DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat,
     ImageReader,
 };
-use tiff::encoder::colortype::RGB8;
+use tiff::TiffResult;
 use tiff::encoder::{Compression, DeflateLevel, Predictor, TiffEncoder};
 
-use super::{Format, Picture, PictureError, jpeg, pixel_count};
+use super::metadata::Metadata;
+use super::{Format, Picture, PictureError, pixel_count};
+
+/// The bytes of a PNG's signature and its header chunk.
+const PNG_HEADER: usize = 33;
 
 /// The shares of all samples that a stretch sends to black and to white, per cent of two hundred.
 const BLACK_PER_200: u64 = 1;
@@ -24,8 +28,10 @@ pub(super) fn decode(bytes: &[u8], format: Format) -> Result<Picture, PictureErr
     let mut reader = ImageReader::with_format(Cursor::new(bytes), kind(format));
     reader.no_limits();
     let mut decoder = reader.into_decoder().map_err(|e| problem(&e, format))?;
-    // A picture whose EXIF cannot be read is one without.
-    let exif = decoder.exif_metadata().ok().flatten();
+    let metadata = match format {
+        Format::Tiff => Metadata::of_tiff(bytes),
+        _ => png_metadata(&mut decoder),
+    };
     let image = DynamicImage::from_decoder(decoder).map_err(|e| problem(&e, format))?;
     let image = match image {
         DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => stretched_grey(&image),
@@ -43,10 +49,7 @@ pub(super) fn decode(bytes: &[u8], format: Format) -> Result<Picture, PictureErr
         pixel[3] = 255;
     }
     let mut picture = Picture::from_parts(width, height, rgba);
-    picture.metadata = exif
-        .and_then(|exif| jpeg::exif_segment(&exif))
-        .into_iter()
-        .collect();
+    picture.metadata = metadata;
     Ok(picture)
 }
 
@@ -69,28 +72,65 @@ pub(super) fn encode_png(picture: &Picture) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     let mut encoder =
         PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
-    if let Some(exif) = picture.metadata.iter().find_map(|s| jpeg::exif_of(s)) {
+    if let Some(exif) = picture.metadata.exif() {
         encoder
             .set_exif_metadata(exif.to_vec())
+            .map_err(|e| e.to_string())?;
+    }
+    if let Some(profile) = picture.metadata.icc() {
+        encoder
+            .set_icc_profile(profile.to_vec())
             .map_err(|e| e.to_string())?;
     }
     let (width, height) = (picture.width, picture.height);
     encoder
         .write_image(&rgb(picture), width, height, ExtendedColorType::Rgb8)
         .map_err(|e| e.to_string())?;
+    if let Some(packet) = picture.metadata.xmp_text() {
+        let chunk = xmp_chunk(packet).ok_or("XMP of more than four gigabytes")?;
+        bytes.splice(PNG_HEADER..PNG_HEADER, chunk);
+    }
     Ok(bytes)
 }
 
 /// The bytes of an 8-bit RGB TIFF, deflated.
 pub(super) fn encode_tiff(picture: &Picture) -> Result<Vec<u8>, String> {
-    let mut file = Cursor::new(Vec::new());
-    let encoder = TiffEncoder::new(&mut file).map_err(|e| e.to_string())?;
-    encoder
+    tiff_file(picture).map_err(|e| e.to_string())
+}
+
+fn tiff_file(picture: &Picture) -> TiffResult<Vec<u8>> {
+    let mut bytes = Cursor::new(Vec::new());
+    let mut file = TiffEncoder::new(&mut bytes)?
         .with_compression(Compression::Deflate(DeflateLevel::Fast))
-        .with_predictor(Predictor::Horizontal)
-        .write_image::<RGB8>(picture.width, picture.height, &rgb(picture))
-        .map_err(|e| e.to_string())?;
-    Ok(file.into_inner())
+        .with_predictor(Predictor::Horizontal);
+    let size = (picture.width, picture.height);
+    let image = picture.metadata.begin_tiff(&mut file, size)?;
+    image.write_data(&rgb(picture))?;
+    Ok(bytes.into_inner())
+}
+
+/// What a PNG says beside its pixels, ahead of them; a part that cannot be read is not there.
+fn png_metadata(decoder: &mut impl ImageDecoder) -> Metadata {
+    let exif = decoder.exif_metadata().ok().flatten();
+    let xmp = decoder.xmp_metadata().ok().flatten();
+    let icc = decoder.icc_profile().ok().flatten();
+    Metadata::new(exif, xmp, icc)
+}
+
+/// An XMP packet as the chunk of a PNG: XMP specification, part 3, 1.1.5; PNG specification, 5.3
+/// and 11.3.3.4.
+fn xmp_chunk(packet: &str) -> Option<Vec<u8>> {
+    // Neither compressed nor in a language nor with a name in one.
+    let content = [b"iTXtXML:com.adobe.xmp\0\0\0\0\0", packet.as_bytes()].concat();
+    let length = u32::try_from(content.len() - 4).ok()?;
+    let mut check = flate2::Crc::new();
+    check.update(&content);
+    let parts = [
+        &length.to_be_bytes(),
+        content.as_slice(),
+        &check.sum().to_be_bytes(),
+    ];
+    Some(parts.concat())
 }
 
 fn rgb(picture: &Picture) -> Vec<u8> {

@@ -24,8 +24,8 @@ pub struct Project<'a> {
     pub format: Format,
     /// The site, which the project's coordinate reference system is centred on.
     pub site: &'a Site,
-    /// Whether the ground mosaic lies beside the project; it is drawn under everything else.
-    pub has_mosaic: bool,
+    /// The system of the ground mosaic, where one lies beside the project; it is drawn under everything else.
+    pub mosaic: Option<Crs>,
 }
 
 /// Layers from the top of the map to its bottom; those first that others must not cover.
@@ -101,7 +101,7 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
     // Footprints would tint the mosaic, whose own outline shows what was seen.
     let is_hidden = |layer: &Layer| match layer.name {
         "detections" => has_rocks,
-        "footprints" => project.has_mosaic,
+        "footprints" => project.mosaic.is_some(),
         _ => false,
     };
     // Writing to a String cannot fail.
@@ -121,7 +121,7 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
             i32::from(layer.name == "rocks"),
         );
     }
-    if project.has_mosaic {
+    if project.mosaic.is_some() {
         let _ = writeln!(
             text,
             "<layer-tree-layer id=\"{ID}mosaic\" name=\"Mosaic\" providerKey=\"gdal\" \
@@ -137,14 +137,19 @@ fn qgs(project: &Project<'_>) -> Result<String, CrsError> {
     );
     for layer in &layers {
         let mut shown = map_layer(project.format, layer, &layer.crs_text()?);
-        if project.has_mosaic && layer.name == "rocks" {
+        if project.mosaic.is_some() && layer.name == "rocks" {
             // So that the rocks of the pictures show through their discs.
             shown = shown.replace(OPAQUE, "<layerOpacity>0.5</layerOpacity>");
         }
         text.push_str(&shown);
     }
-    if project.has_mosaic {
-        text.push_str(&mosaic_layer(&local));
+    if let Some(crs) = &project.mosaic {
+        let own = if crs.definition() == definition {
+            local.clone()
+        } else {
+            system(&CrsText::of(crs.definition())?, false)
+        };
+        text.push_str(&mosaic_layer(&own));
     }
     text.push_str(&properties(&extent, &local));
     Ok(text)
@@ -266,10 +271,10 @@ fn map_layer(format: Format, layer: &Layer, crs: &CrsText) -> String {
 }
 
 /// The mosaic as a layer: its red, green and blue as they are, what no picture shows clear.
-fn mosaic_layer(local: &str) -> String {
+fn mosaic_layer(own: &str) -> String {
     format!(
         "<maplayer type=\"raster\" hasScaleBasedVisibilityFlag=\"0\">\n<id>{ID}mosaic</id>\n\
-         <datasource>./{MOSAIC}</datasource>\n<layername>Mosaic</layername>\n<srs>\n{local}</srs>\n\
+         <datasource>./{MOSAIC}</datasource>\n<layername>Mosaic</layername>\n<srs>\n{own}</srs>\n\
          <provider>gdal</provider>\n<pipe>\n\
          <provider><resampling enabled=\"false\" zoomedInResamplingMethod=\"nearestNeighbour\" \
          zoomedOutResamplingMethod=\"nearestNeighbour\" maxOversampling=\"2\"/></provider>\n\

@@ -5,7 +5,7 @@ use geo::Coord;
 use super::super::format::Format;
 use super::super::layer::{Column, Geometry};
 use super::*;
-use crate::frame::{Geodetic, Planet, Site};
+use crate::frame::{Crs, Geodetic, Planet, Site};
 
 type Row = (&'static str, Option<f64>);
 
@@ -66,10 +66,10 @@ fn a_style_is_well_formed_and_escaped() {
 }
 
 fn project(planet: Planet, place: Geodetic, format: Format) -> String {
-    project_over(planet, place, format, false)
+    project_over(planet, place, format, None)
 }
 
-fn project_over(planet: Planet, place: Geodetic, format: Format, has_mosaic: bool) -> String {
+fn project_over(planet: Planet, place: Geodetic, format: Format, mosaic: Option<Crs>) -> String {
     let layers = [rocks(planet, &[])];
     let site = Site::new(planet, place);
     let project = Project {
@@ -77,7 +77,7 @@ fn project_over(planet: Planet, place: Geodetic, format: Format, has_mosaic: boo
         layers: &layers,
         format,
         site: &site,
-        has_mosaic,
+        mosaic,
     };
     unpacked(&project)
 }
@@ -131,20 +131,46 @@ fn the_mosaic_lies_under_everything_else() {
     let place = Geodetic::from_degrees(49.0, 8.4, 0.0);
     let alone = project(Planet::EARTH, place, Format::GeoPackage);
     assert!(!alone.contains("mosaic") && !alone.contains("<layerOpacity>0.5"));
-    let text = project_over(Planet::EARTH, place, Format::GeoPackage, true);
+    let site = Site::new(Planet::EARTH, place);
+    let over = |wanted: Option<&Crs>| {
+        let crs = crate::publish::mosaic::system(&site, wanted).unwrap();
+        project_over(Planet::EARTH, place, Format::GeoPackage, Some(crs))
+    };
+    let text = over(None);
     let tree = text.split("</layer-tree-group>").next().unwrap();
     let last = tree.rsplit("<layer-tree-layer ").next().unwrap();
     assert!(last.contains("source=\"./mosaic.tif\""), "{last}");
     assert!(text.contains(
         "type=\"multibandcolor\" redBand=\"1\" greenBand=\"2\" blueBand=\"3\" alphaBand=\"4\""
     ));
+    let system = |text: &str| {
+        let layer = text.split("<datasource>./mosaic.tif").nth(1).unwrap();
+        let id = layer.split("<authid>").nth(1).unwrap();
+        id.split('<').next().unwrap().to_owned()
+    };
+    assert_eq!(system(&text), "EPSG:32632");
+    // Degrees are no map, and feet are not metres.
+    for (wanted, expected) in [
+        ("EPSG:25833", "EPSG:25833"),
+        ("EPSG:4258", "EPSG:32632"),
+        ("EPSG:2263", "EPSG:32632"),
+        ("EPSG:2053", "EPSG:32632"), // Counts westwards and southwards.
+    ] {
+        let wanted = Crs::for_map(wanted, Planet::EARTH).unwrap();
+        assert_eq!(
+            system(&over(Some(&wanted))),
+            expected,
+            "{}",
+            wanted.definition()
+        );
+    }
 }
 
 /// Layers of another system than the planet's own say so, and the project opens where they are.
 #[test]
 fn layers_on_a_map_name_its_system() {
     let karlsruhe = Geodetic::from_degrees(49.0, 8.4, 0.0);
-    let crs = crate::frame::Crs::for_map("EPSG:25833", Planet::EARTH).unwrap();
+    let crs = Crs::for_map("EPSG:25833", Planet::EARTH).unwrap();
     let layer = rocks(Planet::EARTH, &[("rock", None)]);
     let layers = [layer.on_map(&crs).unwrap()];
     let site = Site::new(Planet::EARTH, karlsruhe);
@@ -153,7 +179,7 @@ fn layers_on_a_map_name_its_system() {
         layers: &layers,
         format: Format::GeoPackage,
         site: &site,
-        has_mosaic: false,
+        mosaic: None,
     };
     let text = unpacked(&project);
     assert!(
