@@ -59,8 +59,6 @@ pub(super) struct Look {
     pub(super) log_px: Option<f64>,
     /// What the picture's border takes away of the mark.
     pub(super) cut: Cut,
-    /// Whether it takes part of the side that says the size.
-    pub(super) is_size_cut: bool,
     pub(super) class: usize,
     /// Logit of the detector's score.
     pub(super) logit: Option<f64>,
@@ -238,10 +236,6 @@ fn look(index: usize, m: &Measurement, view: usize, settings: &BeliefSettings) -
         n,
         log_px,
         cut: m.cut,
-        is_size_cut: match settings.size_rule {
-            SizeRule::Width => m.cut.across,
-            SizeRule::Height => m.cut.down,
-        },
         class: m.class,
         logit: m.score.filter(|_| settings.scores).map(logit),
     }

@@ -154,7 +154,7 @@ impl Engine<'_> {
             .zip(hits)
             .filter_map(|(look, hit)| {
                 let at = (*hit)?;
-                let log_px = look.log_px.filter(|_| !look.is_size_cut)?;
+                let log_px = look.log_px.filter(|_| !look.cut.is_any())?;
                 let seen = self.expect(look.view, &[at.x, at.y, at.z, 0.0])?;
                 (seen.range_m < self.ranges_m.1).then_some(log_px - seen.log_scale)
             })
