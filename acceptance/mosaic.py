@@ -77,10 +77,7 @@ def targets(folder):
     rms, worst = float(np.sqrt(np.mean(np.square(offs)))), max(offs)
     print(f"{len(offs)} targets, {rms:.2f} pixels of {mosaic.res[0]} m from their places (RMS), "
           f"the farthest {worst:.2f}")
-    # Half a pixel is what the mapped place itself is uncertain by, one standard deviation, and the
-    # mosaic shows one of its views alone.
-    expect("targets within 0.75 pixels of their mapped places (RMS)", rms <= 0.75)
-    expect("every target within 1.5 pixels of its mapped place", worst <= 1.5)
+    expect("every target within a pixel of its mapped place", worst <= 1.0)
 
 
 def cross(grey, shown, at, reach):
