@@ -126,17 +126,26 @@ impl PixelBox {
             && self.y_max <= f64::from(height) - 0.5 - margin
     }
 
-    /// Which of its sides the border of a picture of this size cuts: those with an end within
-    /// `margin` pixels of it. A box that reaches farther out is as large as its detector takes the
-    /// object to be.
-    pub fn cut(&self, width: u32, height: u32, margin: f64) -> Cut {
-        let is_cut = |low: f64, high: f64, length: u32| {
+    /// Which ends, low and high, of its width and of its height the border of a picture of this size
+    /// cuts: those within `margin` pixels of it. A box that reaches farther out is as large as its
+    /// detector takes the object to be.
+    pub fn cut_ends(&self, width: u32, height: u32, margin: f64) -> [(bool, bool); 2] {
+        let cut = |low: f64, high: f64, length: u32| {
             let lies_on = |end: f64, border: f64| (end - border).abs() < margin;
-            lies_on(low, -0.5) || lies_on(high, f64::from(length) - 0.5)
+            (lies_on(low, -0.5), lies_on(high, f64::from(length) - 0.5))
         };
+        [
+            cut(self.x_min, self.x_max, width),
+            cut(self.y_min, self.y_max, height),
+        ]
+    }
+
+    /// Which of its sides the border cuts, at either of their ends.
+    pub fn cut(&self, width: u32, height: u32, margin: f64) -> Cut {
+        let [across, down] = self.cut_ends(width, height, margin);
         Cut {
-            across: is_cut(self.x_min, self.x_max, width),
-            down: is_cut(self.y_min, self.y_max, height),
+            across: across.0 || across.1,
+            down: down.0 || down.1,
         }
     }
 }

@@ -50,13 +50,7 @@ impl Section<'_> {
         let counts: Vec<String> = lengths.iter().map(usize::to_string).collect();
         let expected = format!("a list of {} finite numbers", counts.join(" or "));
         self.take(key, expected, |n| match &n.kind {
-            Kind::List(list) if lengths.contains(&list.len()) => list
-                .iter()
-                .map(|n| match n.kind {
-                    Kind::Number(x) if x.is_finite() => Some(x),
-                    _ => None,
-                })
-                .collect(),
+            Kind::List(list) if lengths.contains(&list.len()) => finite(list),
             _ => None,
         })
     }
@@ -65,13 +59,7 @@ impl Section<'_> {
     pub fn number_list(&self, key: &str) -> Option<Vec<f64>> {
         self.ask(key, Takes::Numbers(Vec::new()));
         self.take(key, "a list of finite numbers", |n| match &n.kind {
-            Kind::List(list) => list
-                .iter()
-                .map(|n| match n.kind {
-                    Kind::Number(x) if x.is_finite() => Some(x),
-                    _ => None,
-                })
-                .collect(),
+            Kind::List(list) => finite(list),
             _ => None,
         })
     }
@@ -84,14 +72,8 @@ impl Section<'_> {
     /// A matrix by its rows, a list of lists, as one list.
     pub fn matrix(&self, key: &str, rows: usize, columns: usize) -> Option<Vec<f64>> {
         let expected = format!("{rows} lists of {columns} finite numbers");
-        let number = |n: &Node| match n.kind {
-            Kind::Number(x) if x.is_finite() => Some(x),
-            _ => None,
-        };
         let row = |n: &Node| match &n.kind {
-            Kind::List(list) if list.len() == columns => {
-                list.iter().map(number).collect::<Option<Vec<f64>>>()
-            }
+            Kind::List(list) if list.len() == columns => finite(list),
             _ => None,
         };
         let matrix = self.take(key, expected, |n| match &n.kind {
@@ -147,4 +129,13 @@ impl Section<'_> {
             _ => word(node).map(|word| vec![word]),
         }
     }
+}
+
+/// Finite numbers, if all are.
+fn finite(list: &[Node]) -> Option<Vec<f64>> {
+    let number = |n: &Node| match n.kind {
+        Kind::Number(x) if x.is_finite() => Some(x),
+        _ => None,
+    };
+    list.iter().map(number).collect()
 }

@@ -94,15 +94,7 @@ fn apparent_width_px(view: &View, place: Point<Enu>, drawn: Pixel, width_m: f64)
 /// A box with a side that the border of a picture (columns, rows) cuts moved outwards: so far that
 /// its height is its width times `aspect`, or where both are cut that it is `width_px` wide.
 fn whole(b: PixelBox, (columns, rows): (u32, u32), width_px: f64, aspect: f64) -> PixelBox {
-    // A box that reaches farther is as large as its detector thinks the object, not cut.
-    let is_cut = |low: f64, high: f64, end: u32| {
-        let lies_on = |at: f64, border: f64| (at - border).abs() < BORDER_PX;
-        (lies_on(low, -0.5), lies_on(high, f64::from(end) - 0.5))
-    };
-    let (across, down) = (
-        is_cut(b.x_min, b.x_max, columns),
-        is_cut(b.y_min, b.y_max, rows),
-    );
+    let [across, down] = b.cut_ends(columns, rows, BORDER_PX);
     let (width, height) = match (across, down) {
         (_, (false, false)) => (b.height() / aspect, b.height()),
         ((false, false), _) => (b.width(), b.width() * aspect),

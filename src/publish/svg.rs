@@ -87,6 +87,11 @@ pub fn title(content: &str) -> String {
 
 /// Text with what XML would take for markup replaced, and what XML has no place for left out.
 pub fn escaped(content: &str) -> String {
+    escaped_but(content, |c| if c.is_control() { ' ' } else { c })
+}
+
+/// Text with what markup is made of replaced, and every other character by what it is mapped to.
+pub(super) fn escaped_but(content: &str, other: impl Fn(char) -> char) -> String {
     let mut safe = String::with_capacity(content.len());
     for c in content.chars() {
         match c {
@@ -94,8 +99,7 @@ pub fn escaped(content: &str) -> String {
             '<' => safe.push_str("&lt;"),
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
-            c if c.is_control() => safe.push(' '),
-            c => safe.push(c),
+            c => safe.push(other(c)),
         }
     }
     safe

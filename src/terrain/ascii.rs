@@ -175,14 +175,8 @@ fn grid(text: &str, shown: &str, crs: &str) -> Result<HeightGrid, Fault> {
     let middle = |is_middle: bool| if is_middle { 0.0 } else { 0.5 };
     #[expect(clippy::cast_precision_loss, reason = "rows are under 2^31")]
     let up = (rows - 1) as f64 + middle(at_middle_y);
-    let map = Affine {
-        x0: west + middle(at_middle_x) * step_x,
-        x_column: step_x,
-        x_row: 0.0,
-        y0: south + up * step_y,
-        y_column: 0.0,
-        y_row: -step_y,
-    };
+    let first = [west + middle(at_middle_x) * step_x, south + up * step_y];
+    let map = Affine::north_up_by(first, [step_x, step_y]);
     HeightGrid::new(columns, rows, Posts::F64(heights), map, crs)
         .map_err(|error| Fault::new(Place::file(shown), "", error.to_string()))
 }

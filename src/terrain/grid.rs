@@ -220,13 +220,18 @@ impl Affine {
     /// Rows that run from west to east and follow each other from north to south, as maps have
     /// them: post (0, 0) at `(west, north)`, its neighbours `step` apart.
     pub fn north_up(west: f64, north: f64, step: f64) -> Self {
+        Self::north_up_by([west, north], [step, step])
+    }
+
+    /// The same with a step to the east and another to the south.
+    pub fn north_up_by([west, north]: [f64; 2], [east, south]: [f64; 2]) -> Self {
         Self {
             x0: west,
-            x_column: step,
+            x_column: east,
             x_row: 0.0,
             y0: north,
             y_column: 0.0,
-            y_row: -step,
+            y_row: -south,
         }
     }
 

@@ -104,13 +104,11 @@ impl Engine<'_> {
         let mut log_odds = vec![self.model.density.ln(); self.objects.len()];
         let mut rates = vec![Rate::default(); self.objects.len()];
         let mut information: Vec<Square4> = Vec::with_capacity(self.objects.len());
-        for (x, l) in self.objects.iter().zip(&mut log_odds) {
+        for (k, (x, l)) in self.objects.iter().zip(&mut log_odds).enumerate() {
             let prior = self.prior(x);
             *l += prior.ln_density + 2.0 * (2.0 * PI).ln();
-            information.push(prior.information);
-        }
-        for (k, l) in log_odds.iter_mut().enumerate() {
             *l += self.class_evidence(k);
+            information.push(prior.information);
         }
         for (edge, worth) in self.edges.iter().zip(&edge_worth) {
             let (look, k) = (&self.looks[edge.look], edge.object);

@@ -2,19 +2,9 @@
 
 /// Text as it stands in an element or an attribute.
 pub(super) fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            // XML has no way to write the other control characters.
-            c if c.is_control() && !matches!(c, '\t' | '\n' | '\r') => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
+    // XML has no way to write the other control characters.
+    let is_written = |c: char| !c.is_control() || matches!(c, '\t' | '\n' | '\r');
+    crate::publish::svg::escaped_but(text, |c| if is_written(c) { c } else { '\u{fffd}' })
 }
 
 /// A text as a literal of QGIS's expressions.

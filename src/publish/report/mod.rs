@@ -126,17 +126,7 @@ fn filled(template: &str, title: &str, data: &str, of: &[&str]) -> String {
 
 /// Text as HTML shows it.
 fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            c => out.push(c),
-        }
-    }
-    out
+    super::svg::escaped_but(text, |c| c)
 }
 
 #[cfg(test)]

@@ -25,14 +25,8 @@ pub(super) fn crs_from_post(
         },
         (_, &[i, j, _, x, y, _, ..], &[sx, sy, ..]) => {
             let middle = if is_point { 0.0 } else { 0.5 };
-            return Ok(Affine {
-                x0: x + (middle - i) * sx,
-                x_column: sx,
-                x_row: 0.0,
-                y0: y - (middle - j) * sy,
-                y_column: 0.0,
-                y_row: -sy,
-            });
+            let first = [x + (middle - i) * sx, y - (middle - j) * sy];
+            return Ok(Affine::north_up_by(first, [sx, sy]));
         }
         (_, tie, _) if tie.len() > 6 => {
             return Err(found(

@@ -256,14 +256,8 @@ fn site_from_post(map: &Group, [columns, rows]: [usize; 2]) -> Result<Affine, Pr
     let [line, sample] = scales.map_or([None; 2], |s| s.map(Some));
     let (_, north, down) = along(["X_AXIS_MINIMUM", "X_AXIS_MAXIMUM"], line, rows)?;
     let (west, _, right) = along(["Y_AXIS_MINIMUM", "Y_AXIS_MAXIMUM"], sample, columns)?;
-    Ok(Affine {
-        x0: west + 0.5 * right,
-        x_column: right,
-        x_row: 0.0,
-        y0: north - 0.5 * down,
-        y_column: 0.0,
-        y_row: -down,
-    })
+    let first = [west + 0.5 * right, north - 0.5 * down];
+    Ok(Affine::north_up_by(first, [right, down]))
 }
 
 /// The keys of a GeoTIFF by their names, each a text, as VICAR programs keep them.

@@ -279,12 +279,6 @@ fn crs_from_post(cartography: Node<'_, '_>) -> Result<Affine, Problem> {
     );
     let corner_x = required("upperleft_corner_x")?;
     let corner_y = required("upperleft_corner_y")?;
-    Ok(Affine {
-        x0: corner_x + 0.5 * step_x,
-        x_column: step_x,
-        x_row: 0.0,
-        y0: corner_y - 0.5 * step_y,
-        y_column: 0.0,
-        y_row: -step_y,
-    })
+    let first = [corner_x + 0.5 * step_x, corner_y - 0.5 * step_y];
+    Ok(Affine::north_up_by(first, [step_x, step_y]))
 }
