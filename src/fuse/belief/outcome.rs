@@ -18,8 +18,12 @@ use crate::fuse::Member;
 const ROUNDS: usize = 12;
 /// And at least.
 const LEAST_ROUNDS: usize = 3;
-/// They are over where no object moves farther, metres.
-const STILL_M: f64 = 1e-3;
+/// They are over where next to no detection changes company or has its object move farther than this
+/// many of its standard deviations: one that wavers between two objects would else keep the longest
+/// traverse going.
+const STILL: f64 = 0.2;
+/// What "next to no" is, as a share of the detections.
+const WAVERING: f64 = 5e-3;
 /// Registration is tried again where more than this share of the detections changed company.
 const DOUBT: f64 = 0.015;
 /// Squared scales of the robust steps between registration and association.
@@ -138,6 +142,14 @@ pub fn fuse_belief(problem: &Problem<'_>, settings: &BeliefSettings) -> Belief {
     best.outcome(problem, n_starts)
 }
 
+/// Which looks belong together, and where their objects are.
+struct Company {
+    /// Of every look the look before it of the same object.
+    partners: Vec<Option<usize>>,
+    /// And where that object is.
+    places: Vec<Option<[f64; 4]>>,
+}
+
 /// A map from one order of the views.
 struct Start<'a> {
     engine: Engine<'a>,
@@ -192,6 +204,32 @@ impl Engine<'_> {
             .collect()
     }
 
+    fn company(&self) -> Company {
+        let owners = self.owners();
+        let places = owners.iter().map(|o| o.map(|k| self.objects[k]));
+        Company {
+            places: places.collect(),
+            partners: self.partners(),
+        }
+    }
+
+    /// The share of looks that changed company, or whose object moved.
+    fn unrest(&self, before: &Company, now: &Company) -> f64 {
+        let owners = self.owners();
+        let still = |look: usize| match (before.places[look], now.places[look], owners[look]) {
+            (Some(was), Some(is), Some(k)) => {
+                let cov = &self.object_cov[k];
+                (0..4).all(|i| (is[i] - was[i]).powi(2) <= STILL * STILL * cov[i][i])
+            }
+            (was, is, _) => was.is_none() && is.is_none(),
+        };
+        let same = |look: usize| before.partners[look] == now.partners[look];
+        let restless = (0..owners.len()).filter(|&look| !same(look) || !still(look));
+        #[expect(clippy::cast_precision_loss, reason = "counts")]
+        let share = restless.count() as f64 / owners.len().max(1) as f64;
+        share
+    }
+
     /// Stage B: rounds of association, adjustment and learning.
     fn refine(&mut self) -> (Evidence, usize, bool) {
         for c2 in SCHEDULE {
@@ -203,18 +241,23 @@ impl Engine<'_> {
             self.adjust(1, robust, false);
         }
         let mut evidence = Evidence::default();
+        let (mut last, mut before_last) = (self.company(), None);
+        let mut objective = f64::NEG_INFINITY;
         for round in 0..ROUNDS {
-            let before = (self.owners(), self.objects.clone());
             evidence = self.round();
             self.learn(&evidence);
-            let same = before.0 == self.owners() && before.1.len() == self.objects.len();
-            let moved = before.1.iter().zip(&self.objects).map(|(a, b)| {
-                let far = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-                far.fold(0.0, f64::max)
-            });
-            if same && moved.fold(0.0, f64::max) < STILL_M && round >= LEAST_ROUNDS {
+            let now = self.company();
+            let is_late = round >= LEAST_ROUNDS;
+            if is_late && self.unrest(&last, &now) <= WAVERING {
                 return (evidence, round + 1, true);
             }
+            // Two maps that follow upon each other for ever: the more probable one is taken.
+            let worse = std::mem::replace(&mut objective, self.objective(&evidence));
+            let swings = before_last.is_some_and(|b| self.unrest(&b, &now) <= WAVERING);
+            if is_late && swings && objective >= worse {
+                return (evidence, round + 1, true);
+            }
+            before_last = Some(std::mem::replace(&mut last, now));
         }
         (evidence, ROUNDS, false)
     }
