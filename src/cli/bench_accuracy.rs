@@ -22,7 +22,7 @@ pub(super) struct Args {
     /// Seeds, both ends included
     #[arg(long, value_name = "A..B")]
     seeds: String,
-    /// Methods to compare
+    /// Methods to compare, separated by commas: em, paper, belief, and the bounds clairvoyant and fair
     #[arg(long, value_name = "METHODS", default_value = "em,paper,belief")]
     methods: String,
     /// Override a key of every pipeline file; may be given several times
