@@ -10,7 +10,7 @@ use crate::experiment::bench::{BenchOptions, Contender, bench_accuracy as carry_
 
 const EXAMPLES: &str = "Examples:
   rockmap bench-accuracy fixtures/scenes/default.toml --seeds 1..20
-  rockmap bench-accuracy fixtures/scenes/*.toml --seeds 1..5 --methods belief,fair --out /tmp/accuracy";
+  rockmap bench-accuracy fixtures/scenes/*.toml --seeds 1..5 --methods fair --out /tmp/accuracy";
 
 /// What `rockmap bench-accuracy` takes.
 #[derive(Debug, clap::Args)]
