@@ -45,12 +45,31 @@ def opened(folder):
     expect(f"{path}: bands", mosaic.count, 4)
     names = [c.name for c in mosaic.colorinterp]
     expect(f"{path}: colours", names, ["red", "green", "blue", "alpha"])
+    check_stac(folder, mosaic)
     opacity = mosaic.read(4)
     expect(f"{path}: opacities", set(np.unique(opacity)) <= {0, 255})
     share = np.count_nonzero(opacity) / opacity.size
     print(f"{path}: {mosaic.width} x {mosaic.height} pixels of {mosaic.res[0]} m, "
           f"overviews {mosaic.overviews(1)}, {100 * share:.0f} % shown, cloud-optimised")
     return mosaic
+
+
+def check_stac(folder, mosaic):
+    """The catalogue's item, where there is one, places the mosaic as the file itself does."""
+    path = folder / "stac.json"
+    if not path.exists():
+        return
+    about = json.loads(path.read_text())["assets"]["mosaic.tif"]
+    expect(f"{path}: shape", tuple(about["proj:shape"]), mosaic.shape)
+    expect(f"{path}: transform", about["proj:transform"], list(mosaic.transform)[:6])
+    if about["proj:code"] is None:
+        crs = pyproj.CRS.from_json_dict(about["proj:projjson"])
+    else:
+        crs = pyproj.CRS(about["proj:code"])
+    own = pyproj.CRS(mosaic.crs.to_wkt())
+    middle = mosaic.transform * (mosaic.width / 2, mosaic.height / 2)
+    off = np.subtract(pyproj.Transformer.from_crs(crs, own, always_xy=True).transform(*middle), middle)
+    expect(f"{path}: system", np.hypot(*off) < 1e-4)
 
 
 def targets(folder):

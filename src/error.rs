@@ -123,6 +123,61 @@ impl Error {
             source,
         }
     }
+
+    /// `Ok` where there are no faults.
+    ///
+    /// # Errors
+    /// [`Error::Faults`] with all of them.
+    pub fn check(faults: Vec<Fault>) -> Result<(), Self> {
+        if faults.is_empty() {
+            Ok(())
+        } else {
+            Err(Self::Faults(faults))
+        }
+    }
+
+    /// `Ok` where every number that was typed as an option lies in its domain.
+    ///
+    /// # Errors
+    /// [`Error::Faults`] with every option that does not.
+    pub fn check_options(options: &[(&str, f64, Domain)]) -> Result<(), Self> {
+        let wrong = options.iter().filter(|(_, x, domain)| !domain.has(*x));
+        let fault = |(option, x, domain): &(&str, f64, Domain)| {
+            Fault::found(Place::default(), *option, x, domain)
+        };
+        Self::check(wrong.map(fault).collect())
+    }
+}
+
+/// Where a number may lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Domain {
+    /// Above zero, and finite.
+    AboveZero,
+    /// 0 to 1, both included.
+    Share,
+    /// 0 to 1, neither included.
+    InnerShare,
+}
+
+impl Domain {
+    fn has(self, x: f64) -> bool {
+        match self {
+            Self::AboveZero => x > 0.0 && x.is_finite(),
+            Self::Share => (0.0..=1.0).contains(&x),
+            Self::InnerShare => x > 0.0 && x < 1.0,
+        }
+    }
+}
+
+impl fmt::Display for Domain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::AboveZero => "a number above zero",
+            Self::Share => "0 to 1",
+            Self::InnerShare => "above 0, below 1",
+        })
+    }
 }
 
 impl From<Fault> for Error {

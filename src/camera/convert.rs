@@ -161,9 +161,7 @@ fn convert<const N: usize>(
         record.extend(others.iter().map(|c| row.text(c).unwrap_or("").to_owned()));
         writer.write_record(&record).map_err(failed)?;
     }
-    if !faults.is_empty() {
-        return Err(Error::Faults(faults));
-    }
+    Error::check(faults)?;
     let csv = writer.into_inner();
     Ok(Converted {
         csv: csv.map_err(|e| Error::Output(format!("cannot write a table: {e}")))?,

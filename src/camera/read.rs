@@ -41,10 +41,7 @@ pub fn cameras_from_toml(text: &str, shown: &str) -> Result<Cameras, Error> {
         .map(|(name, section)| camera(name, section))
         .collect();
     root.finish();
-    let faults = document.into_faults();
-    if !faults.is_empty() {
-        return Err(Error::Faults(faults));
-    }
+    Error::check(document.into_faults())?;
     let named = cameras.into_iter().flatten().map(|c| (c.name.clone(), c));
     Ok(named.collect())
 }

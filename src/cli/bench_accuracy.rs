@@ -10,7 +10,7 @@ use crate::experiment::bench::{BenchOptions, Contender, bench_accuracy as carry_
 
 const EXAMPLES: &str = "Examples:
   rockmap bench-accuracy fixtures/scenes/default.toml --seeds 1..20
-  rockmap bench-accuracy fixtures/scenes/*.toml --seeds 1..5 --methods em,paper --out /tmp/accuracy";
+  rockmap bench-accuracy fixtures/scenes/*.toml --seeds 1..5 --methods fair --out /tmp/accuracy";
 
 /// What `rockmap bench-accuracy` takes.
 #[derive(Debug, clap::Args)]
@@ -22,8 +22,8 @@ pub(super) struct Args {
     /// Seeds, both ends included
     #[arg(long, value_name = "A..B")]
     seeds: String,
-    /// Methods to compare
-    #[arg(long, value_name = "METHODS", default_value = "em,paper")]
+    /// Methods to compare, separated by commas: em, paper, belief, and the bounds clairvoyant and fair
+    #[arg(long, value_name = "METHODS", default_value = "em,paper,belief")]
     methods: String,
     /// Override a key of every pipeline file; may be given several times
     #[arg(long, value_name = "KEY.PATH=VALUE")]

@@ -27,8 +27,10 @@ pub(super) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Question {
     /// The rays of pixels: a table of pixels in, one of origins and unit directions out
+    #[command(after_help = "Columns of the table: u_px, v_px; others are kept.")]
     Rays(TableArgs),
     /// The pixels of points: a table of points in, one of raw pixels out
+    #[command(after_help = "Columns of the table: x_m, y_m, z_m; others are kept.")]
     Pixels(TableArgs),
     /// The cameras of a file: name, model, size, horizontal field of view
     List(ListArgs),
@@ -67,7 +69,7 @@ struct TableArgs {
         allow_negative_numbers = true
     )]
     tilt_deg: f64,
-    /// Add derivatives
+    /// Add columns of derivatives: of directions by pixels, of pixels by points
     #[arg(long)]
     jacobian: bool,
 }

@@ -19,11 +19,11 @@ pub(super) struct Args {
     #[arg(long, value_name = "DIR", default_value = "outputs/reproduction")]
     out: PathBuf,
     /// Seed of the experiments
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
+    #[arg(long, value_name = "N", default_value_t = ReproduceOptions::SEED)]
+    seed: u64,
     /// Trials of each simulated figure
-    #[arg(long, value_name = "N")]
-    trials: Option<usize>,
+    #[arg(long, value_name = "N", default_value_t = ReproduceOptions::N_TRIALS)]
+    trials: usize,
     /// Replace the outputs of another run
     #[arg(long)]
     force: bool,
@@ -34,8 +34,8 @@ pub(super) struct Args {
 
 pub(super) fn reproduce(args: &Args) -> Result<ExitCode, Error> {
     let mut options = ReproduceOptions::new(args.out.clone());
-    options.seed = args.seed.unwrap_or(options.seed);
-    options.n_trials = args.trials.unwrap_or(options.n_trials);
+    options.seed = args.seed;
+    options.n_trials = args.trials;
     options.force = args.force;
     let reproduction = carry_out(&options, &Console::new(args.quiet))?;
     if !args.quiet {

@@ -22,7 +22,7 @@ pub use shift::Shift;
 use nalgebra::Vector2;
 use serde::Serialize;
 
-use crate::error::{Error, Fault, Place};
+use crate::error::{Domain, Error, Fault, Place};
 use crate::evaluate::{Estimate, agree};
 use crate::frame::{Geodetic, Site};
 use pairs::{Spot, matched};
@@ -64,32 +64,13 @@ impl Options {
     /// # Errors
     /// Every option that does not, named as on the command line.
     pub fn check(&self) -> Result<(), Error> {
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        let above_zero = "a number above zero";
-        let align_m = self.align_m.unwrap_or(1.0);
-        let open = self.confidence > 0.0 && self.confidence < 1.0;
-        let closed = (0.0..=1.0).contains(&self.min_exist);
-        let faults: Vec<Fault> = [
-            ("--sigma", self.sigma_m, positive(self.sigma_m), above_zero),
-            ("--confidence", self.confidence, open, "above 0, below 1"),
-            (
-                "--radius",
-                self.radius_m,
-                positive(self.radius_m),
-                above_zero,
-            ),
-            ("--min-exist", self.min_exist, closed, "0 to 1"),
-            ("--align", align_m, positive(align_m), above_zero),
-        ]
-        .into_iter()
-        .filter(|&(_, _, right, _)| !right)
-        .map(|(option, found, _, expected)| Fault::found(Place::default(), option, found, expected))
-        .collect();
-        if faults.is_empty() {
-            Ok(())
-        } else {
-            Err(Error::Faults(faults))
-        }
+        Error::check_options(&[
+            ("--sigma", self.sigma_m, Domain::AboveZero),
+            ("--confidence", self.confidence, Domain::InnerShare),
+            ("--radius", self.radius_m, Domain::AboveZero),
+            ("--min-exist", self.min_exist, Domain::Share),
+            ("--align", self.align_m.unwrap_or(1.0), Domain::AboveZero),
+        ])
     }
 
     /// The greatest squared Mahalanobis distance of a pair: the quantile of chi-squared with two

@@ -31,10 +31,7 @@ pub(super) fn read(text: &str, shown: &str, file: usize) -> Result<DetectionFile
             );
         }
     };
-    let faults = document.take_faults();
-    if !faults.is_empty() {
-        return Err(Error::Faults(faults));
-    }
+    Error::check(document.take_faults())?;
     let mut read = DetectionFile {
         detections: Vec::new(),
         rejects: Vec::new(),

@@ -79,11 +79,8 @@ pub fn map_from_bytes(bytes: &[u8], shown: &str) -> Result<RockMap, Error> {
         }
     }
     faults.extend(first_repeat(&estimates, shown));
-    if faults.is_empty() {
-        Ok(RockMap { planet, estimates })
-    } else {
-        Err(Error::Faults(faults))
-    }
+    Error::check(faults)?;
+    Ok(RockMap { planet, estimates })
 }
 
 /// One feature of a file, whose faults name it.

@@ -40,7 +40,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::error::{Error, Fault, Place};
+use crate::error::{Domain, Error};
 use crate::frame::{Geodetic, Planet};
 
 /// What counts, and how far is too far.
@@ -76,36 +76,11 @@ impl Options {
     /// # Errors
     /// Every option that does not, named as on the command line.
     pub fn check(&self) -> Result<(), Error> {
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        let faults: Vec<Fault> = [
-            (
-                "--radius",
-                self.radius_m,
-                positive(self.radius_m),
-                "a number above zero",
-            ),
-            (
-                "--cutoff",
-                self.cutoff_m,
-                positive(self.cutoff_m),
-                "a number above zero",
-            ),
-            (
-                "--min-exist",
-                self.min_exist,
-                (0.0..=1.0).contains(&self.min_exist),
-                "0 to 1",
-            ),
-        ]
-        .into_iter()
-        .filter(|&(_, _, right, _)| !right)
-        .map(|(option, found, _, expected)| Fault::found(Place::default(), option, found, expected))
-        .collect();
-        if faults.is_empty() {
-            Ok(())
-        } else {
-            Err(Error::Faults(faults))
-        }
+        Error::check_options(&[
+            ("--radius", self.radius_m, Domain::AboveZero),
+            ("--cutoff", self.cutoff_m, Domain::AboveZero),
+            ("--min-exist", self.min_exist, Domain::Share),
+        ])
     }
 }
 

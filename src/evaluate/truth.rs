@@ -192,11 +192,8 @@ fn rows<T>(
             Err(fault) => faults.push(fault),
         }
     }
-    if faults.is_empty() {
-        Ok(records)
-    } else {
-        Err(Error::Faults(faults))
-    }
+    Error::check(faults)?;
+    Ok(records)
 }
 
 fn place(row: &Row<'_>) -> Result<Geodetic, Fault> {

@@ -188,11 +188,8 @@ fn read_scenes(paths: &[PathBuf]) -> Result<Vec<(String, Scene)>, Error> {
     if scenes.is_empty() && faults.is_empty() {
         return Err(option_fault("SCENES", "none".to_owned(), "at least one"));
     }
-    if faults.is_empty() {
-        Ok(scenes)
-    } else {
-        Err(Error::Faults(faults))
-    }
+    Error::check(faults)?;
+    Ok(scenes)
 }
 
 fn stem(path: &Path) -> String {

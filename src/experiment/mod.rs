@@ -52,12 +52,17 @@ pub struct ReproduceOptions {
 }
 
 impl ReproduceOptions {
-    /// The paper's 50 trials.
+    /// The seed unless another is asked for.
+    pub const SEED: u64 = 2005;
+    /// The paper's trials.
+    pub const N_TRIALS: usize = 50;
+
+    /// The paper's number of trials.
     pub fn new(out: PathBuf) -> Self {
         Self {
             out,
-            seed: 2005,
-            n_trials: 50,
+            seed: Self::SEED,
+            n_trials: Self::N_TRIALS,
             force: false,
         }
     }

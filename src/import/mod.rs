@@ -76,11 +76,8 @@ pub fn read(files: &[PathBuf], attitude: Option<Rotation<Enu, Body>>) -> Result<
         imported.notes.extend(notes);
     }
     faults.extend(sites::join(&mut imported.images, &origins));
-    if faults.is_empty() {
-        Ok(imported)
-    } else {
-        Err(Error::Faults(faults))
-    }
+    Error::check(faults)?;
+    Ok(imported)
 }
 
 /// The picture of a label: a file beside it, named as the label or as the product is.

@@ -162,6 +162,12 @@ impl Document {
         std::mem::take(&mut *self.faults.borrow_mut())
     }
 
+    /// [`Self::take_faults`] as they are told.
+    #[cfg(test)]
+    pub(super) fn faults_said(&self) -> Vec<String> {
+        self.take_faults().iter().map(Fault::to_string).collect()
+    }
+
     /// The keys that were asked for, each once, in the order of asking.
     pub fn asked(&self) -> Vec<Asked> {
         self.asked.borrow().clone()

@@ -152,13 +152,8 @@ mod tests {
         assert_eq!(rows[0].boolean("u"), Some(true));
         rows[1].fault("u", "nothing", "a number");
         root.number_list("a");
-        let faults: Vec<String> = document
-            .take_faults()
-            .iter()
-            .map(Fault::to_string)
-            .collect();
         assert_eq!(
-            faults,
+            document.faults_said(),
             [
                 "d.json:3:24: list[1].u: found nothing, expected a number",
                 "d.json:1:2: a: found a list of 3, expected a list of finite numbers",

@@ -314,13 +314,8 @@ mod tests {
         assert_eq!(image.integer("LINES", 1..=4), None);
         assert_eq!(image.words("LINES__UNIT").unwrap(), ["pixel"]);
         assert_eq!(image.words("LINES").unwrap(), ["1024"]);
-        let faults: Vec<String> = document
-            .take_faults()
-            .iter()
-            .map(Fault::to_string)
-            .collect();
         assert_eq!(
-            faults,
+            document.faults_said(),
             ["a.lbl:15:2: IMAGE.LINES: found 1024, expected a whole number from 1 to 4"]
         );
     }

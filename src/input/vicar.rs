@@ -191,13 +191,8 @@ mod tests {
         assert_eq!(model.texts("N").unwrap(), ["X", "Y"]);
         root.section("IMAGE_DATA").integer("LINES", 1..=4);
         assert!(!root.has("USER"));
-        let faults: Vec<String> = document
-            .take_faults()
-            .iter()
-            .map(Fault::to_string)
-            .collect();
         assert_eq!(
-            faults,
+            document.faults_said(),
             ["a.vic:1:121: IMAGE_DATA.LINES: found 12, expected a whole number from 1 to 4"]
         );
     }

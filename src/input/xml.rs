@@ -96,13 +96,8 @@ mod tests {
         let all = a.tables("o");
         assert_eq!(all[0].name("n").unwrap(), "1");
         all[1].number("n", .., "a number");
-        let faults: Vec<String> = document
-            .take_faults()
-            .iter()
-            .map(Fault::to_string)
-            .collect();
         assert_eq!(
-            faults,
+            document.faults_said(),
             ["a.xml:6:35: a.o[1].n: found \"x\", expected a number"]
         );
     }

@@ -100,13 +100,8 @@ mod tests {
         assert_eq!(root.boolean("flag"), Some(true));
         let m = root.section("m");
         assert_eq!(m.numbers("data", &[3]), None);
-        let faults: Vec<String> = document
-            .take_faults()
-            .iter()
-            .map(Fault::to_string)
-            .collect();
         assert_eq!(
-            faults,
+            document.faults_said(),
             ["c.yml:8:4: m.data: found a list of 3, expected a list of 3 finite numbers"]
         );
     }

@@ -179,11 +179,7 @@ impl Faults {
     }
 
     fn none(self) -> Result<(), Error> {
-        if self.faults.is_empty() {
-            Ok(())
-        } else {
-            Err(Error::Faults(self.faults))
-        }
+        Error::check(self.faults)
     }
 }
 

@@ -5,6 +5,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::format::Format;
 use super::layer::{Geometry, Layer, Value, union};
+use super::mosaic::MosaicGrid;
 use crate::frame::{Crs, CrsText, Planet};
 use crate::pose::Time;
 
@@ -34,7 +35,12 @@ pub struct Asset {
     pub role: &'static str,
     /// Its coordinate reference system, where it is not the planet's own.
     pub crs: Option<String>,
+    /// Where its pixels are, if it has any.
+    pub grid: Option<MosaicGrid>,
 }
+
+/// The media type of the ground mosaic.
+const MOSAIC: &str = "image/tiff; application=geotiff; profile=cloud-optimized";
 
 impl Asset {
     /// The asset that a file of the output folder is; `None` for a style, which goes with its
@@ -44,10 +50,7 @@ impl Asset {
         let (media_type, role) = match (name, extension) {
             (_, "qml") => return None,
             (_, "qgz") => ("application/vnd.qgis.qgz", "visual"),
-            (_, "tif") => (
-                "image/tiff; application=geotiff; profile=cloud-optimized",
-                "visual",
-            ),
+            (_, "tif") => (MOSAIC, "visual"),
             ("run" | "timing", "json") => ("application/json", "metadata"),
             ("rejects" | "evidence", _) => ("text/csv", "metadata"),
             (_, extension) => {
@@ -61,6 +64,7 @@ impl Asset {
             media_type,
             role,
             crs: None,
+            grid: None,
         })
     }
 
@@ -72,6 +76,45 @@ impl Asset {
             .filter(|_| is_map)
             .map(|crs| crs.definition().to_owned());
         Self { crs, ..self }
+    }
+
+    /// The same, where the mosaic has that grid.
+    #[must_use]
+    pub fn on_grid(self, grid: Option<&MosaicGrid>) -> Self {
+        let grid = grid.filter(|_| self.media_type == MOSAIC).cloned();
+        Self {
+            crs: grid.as_ref().map(|grid| grid.crs.clone()).or(self.crs),
+            grid,
+            ..self
+        }
+    }
+
+    /// What the item says of it.
+    fn json(&self) -> Json {
+        let mut about = json!({
+            "href": format!("./{}", self.file),
+            "title": self.title,
+            "type": self.media_type,
+            "roles": [self.role],
+        });
+        let crs = self.crs.as_ref().and_then(|crs| CrsText::of(crs).ok());
+        match crs {
+            Some(crs) if crs.code > 0 => {
+                about["proj:code"] = json!(format!("{}:{}", crs.authority, crs.code));
+            }
+            Some(crs) => {
+                about["proj:code"] = Json::Null;
+                about["proj:projjson"] = crs.projjson;
+            }
+            None => {}
+        }
+        if let Some(grid) = &self.grid {
+            let step = grid.scale.m_per_px;
+            about["proj:shape"] = json!([grid.rows, grid.columns]);
+            // Two rows of a matrix: from column, row and one to easting and northing.
+            about["proj:transform"] = json!([step, 0.0, grid.west_m, 0.0, -step, grid.north_m]);
+        }
+        about
     }
 }
 
@@ -105,26 +148,7 @@ pub fn text(item: &Item<'_>) -> Option<String> {
         let body = crs.name.split(" (").next();
         properties.insert("ssys:targets".to_owned(), json!([body]));
     }
-    let assets = item.assets.iter().map(|asset| {
-        let mut about = json!({
-            "href": format!("./{}", asset.file),
-            "title": asset.title,
-            "type": asset.media_type,
-            "roles": [asset.role],
-        });
-        let crs = asset.crs.as_ref().and_then(|crs| CrsText::of(crs).ok());
-        match crs {
-            Some(crs) if crs.code > 0 => {
-                about["proj:code"] = json!(format!("{}:{}", crs.authority, crs.code));
-            }
-            Some(crs) => {
-                about["proj:code"] = Json::Null;
-                about["proj:projjson"] = crs.projjson;
-            }
-            None => {}
-        }
-        (asset.file.clone(), about)
-    });
+    let assets = item.assets.iter().map(|a| (a.file.clone(), a.json()));
     let value = json!({
         "type": "Feature",
         "stac_version": "1.0.0",

@@ -64,12 +64,8 @@ impl Scene {
             cameras,
         };
         root.finish();
-        let faults = document.into_faults();
-        if faults.is_empty() {
-            Ok(scene)
-        } else {
-            Err(Error::Faults(faults))
-        }
+        Error::check(document.into_faults())?;
+        Ok(scene)
     }
 }
 

@@ -94,19 +94,10 @@ impl March<'_> {
         };
         for doubling in 0..24 {
             let margin = 1e-8 * f64::from(1u32 << doubling);
-            let (mut above, mut below) = ((t - margin).max(0.0), t + margin);
-            if under(above) || !under(below) {
-                continue;
+            let ends = ((t - margin).max(0.0), t + margin);
+            if let Some(t) = bisected(under, ends) {
+                return t;
             }
-            for _ in 0..60 {
-                let middle = 0.5 * (above + below);
-                if under(middle) {
-                    below = middle;
-                } else {
-                    above = middle;
-                }
-            }
-            return below;
         }
         t
     }
@@ -149,19 +140,7 @@ impl March<'_> {
             self.above(crossing, t)
                 .is_some_and(|(above, _)| above <= 0.0)
         };
-        let (mut above, mut below) = ends;
-        if under(above) || !under(below) {
-            return None;
-        }
-        for _ in 0..60 {
-            let middle = 0.5 * (above + below);
-            if under(middle) {
-                below = middle;
-            } else {
-                above = middle;
-            }
-        }
-        self.is_known(crossing, below).then_some(below)
+        bisected(under, ends).filter(|&t| self.is_known(crossing, t))
     }
 
     /// Whether the raster knows the ground at `t`: a hit just off its edge is none.
@@ -239,6 +218,23 @@ impl Crossing {
             Surface::Outside(_) => self.climb,
         }
     }
+}
+
+/// Where `under` begins to hold, between two ends of which it holds at the second alone; `None`
+/// where they are otherwise.
+fn bisected(under: impl Fn(f64) -> bool, (mut above, mut below): (f64, f64)) -> Option<f64> {
+    if under(above) || !under(below) {
+        return None;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (above + below);
+        if under(middle) {
+            below = middle;
+        } else {
+            above = middle;
+        }
+    }
+    Some(below)
 }
 
 #[expect(

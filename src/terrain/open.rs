@@ -69,9 +69,7 @@ impl Terrain {
                 Err(error) => return Err(error),
             }
         }
-        if !faults.is_empty() {
-            return Err(Error::Faults(faults));
-        }
+        Error::check(std::mem::take(&mut faults))?;
         let in_file = |number: usize| Place::file(files[number].1.clone());
         let terrain = Self::from_grids(site, grids, outside_m)
             .map_err(|(number, error)| Fault::new(in_file(number), "crs", error.to_string()))?;
@@ -88,14 +86,11 @@ impl Terrain {
                 }
             }
         }
-        if faults.is_empty() {
-            Ok(Self {
-                geoid_grids,
-                ..terrain
-            })
-        } else {
-            Err(Error::Faults(faults))
-        }
+        Error::check(faults)?;
+        Ok(Self {
+            geoid_grids,
+            ..terrain
+        })
     }
 }
 

@@ -64,9 +64,7 @@ pub(super) fn read(text: &str, shown: &str) -> Result<CameraFile, Error> {
         let expected = "lines CAMERA_ID MODEL WIDTH HEIGHT PARAMS";
         faults.push(Fault::found(Place::file(shown), "", "no camera", expected));
     }
-    if !faults.is_empty() {
-        return Err(Error::Faults(faults));
-    }
+    Error::check(faults)?;
     found.note(NO_MOUNT);
     found.finish(CameraFormat::Colmap)
 }

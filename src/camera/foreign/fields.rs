@@ -1,21 +1,8 @@
 //! What the calibration formats have in common: sizes, camera matrices, coefficients.
 
+pub(super) use crate::camera::read::{required, side};
 use crate::camera::{BadLens, BrownConrady, Camera, Fisheye, Intrinsics, Lens, Mount, Pinhole};
 use crate::input::Section;
-
-/// A key that must be there.
-pub(super) fn required<T>(
-    section: &Section,
-    key: &str,
-    expected: &str,
-    read: impl FnOnce(&Section, &str) -> Option<T>,
-) -> Option<T> {
-    if section.has(key) {
-        return read(section, key);
-    }
-    section.fault(key, "nothing", expected);
-    None
-}
 
 /// The one of several spellings of a key that the section has; the first where it has none.
 pub(super) fn spelling<'k>(section: &Section, keys: &[&'k str]) -> &'k str {
@@ -24,14 +11,6 @@ pub(super) fn spelling<'k>(section: &Section, keys: &[&'k str]) -> &'k str {
         .copied()
         .find(|key| section.has(key))
         .unwrap_or(first)
-}
-
-/// Columns or rows of a picture.
-pub(super) fn side(section: &Section, key: &str) -> Option<u32> {
-    let side = required(section, key, "the picture's size in pixels", |s, key| {
-        s.integer(key, 1..=1_000_000)
-    })?;
-    u32::try_from(side).ok()
 }
 
 /// The lens, or the fault that its parameters make none.

@@ -125,10 +125,7 @@ pub fn cameras_from_bytes(bytes: &[u8], path: &Path, shown: &str) -> Result<Came
         CameraFormat::Mars2020 => mars2020::read(&document.root(), &mut found),
         _ => label::read(&document.root(), &stem, &mut found),
     }
-    let faults = document.into_faults();
-    if !faults.is_empty() {
-        return Err(Error::Faults(faults));
-    }
+    Error::check(document.into_faults())?;
     found.finish(format)
 }
 

@@ -3,11 +3,18 @@
 use super::Map;
 use crate::error::Error;
 use crate::frame::Crs;
-use crate::publish::{Format, Layer, Product, mosaic, qgis, stac, table};
+use crate::publish::mosaic::{self, MosaicGrid};
+use crate::publish::{Format, Layer, Product, qgis, stac, table};
+
+/// The file of the ground mosaic, and where its pixels are.
+pub(super) struct MosaicFile {
+    file: Product,
+    grid: MosaicGrid,
+}
 
 impl Map<'_> {
     /// The pictures laid on the ground, where that is asked for, and what was odd about it.
-    pub(super) fn mosaic(&self) -> Result<(Option<Product>, Vec<String>), Error> {
+    pub(super) fn mosaic(&self) -> Result<(Option<MosaicFile>, Vec<String>), Error> {
         let output = &self.config.output;
         if !output.mosaic {
             return Ok((None, Vec::new()));
@@ -18,8 +25,10 @@ impl Map<'_> {
             warnings.push("no mosaic: no picture shows ground".to_owned());
             return Ok((None, warnings));
         };
+        let grid = mosaic.grid.clone();
         let content = mosaic::encode(mosaic, self.scene.site)?;
-        Ok((Some(Product::new("mosaic.tif", content)), warnings))
+        let file = Product::new("mosaic.tif", content);
+        Ok((Some(MosaicFile { file, grid }), warnings))
     }
 
     fn mosaic_crs(&self) -> Result<Crs, Error> {
@@ -27,10 +36,11 @@ impl Map<'_> {
         crs.map_err(|e| Error::Output(e.to_string()))
     }
 
-    pub(super) fn products(&self, mosaic: Option<Product>) -> Result<Vec<Product>, Error> {
+    pub(super) fn products(&self, mosaic: Option<MosaicFile>) -> Result<Vec<Product>, Error> {
         let layers = self.layers();
         let formats = &self.config.output.formats;
-        let mut products: Vec<Product> = mosaic.into_iter().collect();
+        let (file, grid) = mosaic.map(|m| (m.file, m.grid)).unzip();
+        let mut products: Vec<Product> = file.into_iter().collect();
         let on_map = self.on_map(&layers)?;
         for format in formats {
             let layers = if *format == Format::GeoJson {
@@ -51,9 +61,8 @@ impl Map<'_> {
             let shown = layers.iter().filter(|l| l.geometry.is_some());
             products.extend(shown.map(|l| Product::new(format!("{}.qml", l.name), qgis::qml(l))));
         }
-        let has_mosaic = products.iter().any(|p| p.name == "mosaic.tif");
-        products.extend(self.project_file(&layers, &on_map, has_mosaic)?);
-        products.extend(self.catalogue_item(&layers, &products));
+        products.extend(self.project_file(&layers, &on_map, grid.is_some())?);
+        products.extend(self.catalogue_item(&layers, &products, grid.as_ref()));
         Ok(products)
     }
 
@@ -115,7 +124,12 @@ impl Map<'_> {
         Ok(Some(Product::new("rockmap.qgz", qgis::qgz(&project)?)))
     }
 
-    fn catalogue_item(&self, layers: &[Layer], products: &[Product]) -> Option<Product> {
+    fn catalogue_item(
+        &self,
+        layers: &[Layer],
+        products: &[Product],
+        mosaic: Option<&MosaicGrid>,
+    ) -> Option<Product> {
         let files = products.iter().map(|p| p.name.as_str());
         let item = stac::Item {
             id: format!("{}-{}", self.config.site.name, self.run_id),
@@ -126,6 +140,7 @@ impl Map<'_> {
                 .chain(["rejects.csv", "run.json"])
                 .filter_map(stac::Asset::of)
                 .map(|asset| asset.on_map(self.config.output.crs.as_ref()))
+                .map(|asset| asset.on_grid(mosaic))
                 .collect(),
         };
         Some(Product::new("stac.json", stac::text(&item)?))

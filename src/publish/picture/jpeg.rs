@@ -11,6 +11,7 @@ use super::{Format, Picture, PictureError, pixel_count};
 const START_OF_SCAN: u8 = 0xda;
 const END_OF_IMAGE: u8 = 0xd9;
 const APP0: u8 = 0xe0;
+const APP14: u8 = 0xee;
 const APP15: u8 = 0xef;
 
 /// What libjpeg complains of in files that decode as they should.
@@ -21,9 +22,15 @@ const HARMLESS: [&str; 4] = [
     "Invalid SOS parameters",
 ];
 
-/// Decodes a grey or colour JPEG.
+/// Decodes a grey or colour JPEG, in printing colours or not.
 pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
-    let (width, height) = size(&mut Cursor::new(bytes))?;
+    let frame = frame(&mut Cursor::new(bytes))?;
+    let (width, height, is_print) = (frame.width, frame.height, frame.n_components == 4);
+    if is_print && !is_adobe(bytes) {
+        return Err(unsound(
+            "CMYK without Adobe's segment, by which 0 is all ink",
+        ));
+    }
     let mut rgba = vec![0; pixel_count(width, height)? * 4];
     let mut decompressor = Decompressor::new().map_err(|e| problem(&e))?;
     let decoded = decompressor.decompress(
@@ -33,12 +40,19 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
             width: width as usize,
             pitch: width as usize * 4,
             height: height as usize,
-            format: PixelFormat::RGBA,
+            format: if is_print {
+                PixelFormat::CMYK
+            } else {
+                PixelFormat::RGBA
+            },
         },
     );
     match decoded {
         Err(error) if !is_harmless(&error) => return Err(problem(&error)),
         _ => {}
+    }
+    if is_print {
+        light_of_inks(&mut rgba);
     }
     let mut picture = Picture::from_parts(width, height, rgba);
     picture.metadata = metadata(bytes);
@@ -48,6 +62,26 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, PictureError> {
         Ok(known) => known,
     };
     Ok(picture)
+}
+
+/// Whether an Adobe program, or one that does alike, wrote the file: inks then count from 255 for
+/// none to 0 for all (Adobe Technical Note 5116).
+fn is_adobe(bytes: &[u8]) -> bool {
+    Segments::new(bytes)
+        .any(|s| s.marker == APP14 && bytes[s.start + 4..s.end].starts_with(b"Adobe"))
+}
+
+/// Red, green and blue of cyan, magenta, yellow and black by Adobe's count: the light that the ink
+/// of one colour lets through, less what the black one takes. What the inks of some press would look
+/// like, which a profile would say, is not asked.
+fn light_of_inks(pixels: &mut [u8]) {
+    for pixel in pixels.chunks_exact_mut(4) {
+        let black = u32::from(pixel[3]);
+        for ink in &mut pixel[..3] {
+            *ink = u8::try_from((u32::from(*ink) * black + 127) / 255).unwrap_or(u8::MAX);
+        }
+        pixel[3] = 255;
+    }
 }
 
 /// Encodes with colour as fine as in the source, and with the metadata after the JFIF header.
@@ -106,6 +140,19 @@ fn compress(
 
 /// Columns and rows from the frame header, reading no further.
 pub(super) fn size<R: BufRead + Seek>(file: &mut R) -> Result<(u32, u32), PictureError> {
+    frame(file).map(|frame| (frame.width, frame.height))
+}
+
+/// What a frame header says.
+struct Frame {
+    width: u32,
+    height: u32,
+    /// One of grey, three of colour, four of CMYK.
+    n_components: u8,
+}
+
+/// The frame header, reading no further.
+fn frame<R: BufRead + Seek>(file: &mut R) -> Result<Frame, PictureError> {
     let early = |error: std::io::Error| match error.kind() {
         ErrorKind::UnexpectedEof => PictureError::EndsEarly(Format::Jpeg),
         _ => unsound(&error.to_string()),
@@ -125,11 +172,15 @@ pub(super) fn size<R: BufRead + Seek>(file: &mut R) -> Result<(u32, u32), Pictur
             0x01 | 0xd0..=0xd8 => {}
             // SOF0 to SOF15, without DHT, JPG and DAC, which share their range.
             0xc0..=0xcf if !matches!(byte[0], 0xc4 | 0xc8 | 0xcc) => {
-                let mut frame = [0; 7];
+                let mut frame = [0; 8];
                 file.read_exact(&mut frame).map_err(early)?;
                 let height = u32::from(u16::from_be_bytes([frame[3], frame[4]]));
                 let width = u32::from(u16::from_be_bytes([frame[5], frame[6]]));
-                return pixel_count(width, height).map(|_| (width, height));
+                return pixel_count(width, height).map(|_| Frame {
+                    width,
+                    height,
+                    n_components: frame[7],
+                });
             }
             START_OF_SCAN | END_OF_IMAGE => return Err(unsound("no frame header")),
             _ => {

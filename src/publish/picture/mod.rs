@@ -43,7 +43,7 @@ pub struct Picture {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Format {
-    /// JPEG (ISO/IEC 10918-1), grey or colour, 8 bits.
+    /// JPEG (ISO/IEC 10918-1), grey, colour or the CMYK of Adobe, 8 bits.
     Jpeg,
     /// PNG, 8 bits, or 16 bits that are stretched.
     Png,

@@ -4,6 +4,7 @@ use std::error::Error as _;
 use std::io::{BufRead, Cursor, ErrorKind, Read, Seek, SeekFrom};
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::error::UnsupportedErrorKind;
 use image::{
     DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat,
     ImageReader,
@@ -231,7 +232,17 @@ fn problem(error: &ImageError, format: Format) -> PictureError {
     if ends_early(error) {
         return PictureError::EndsEarly(format);
     }
-    let why = error.source().map_or(error.to_string(), |e| e.to_string());
+    let kind = match error {
+        ImageError::Unsupported(e) => Some(e.kind()),
+        _ => None,
+    };
+    let why = match kind {
+        Some(UnsupportedErrorKind::Color(ExtendedColorType::Unknown(bits))) => {
+            format!("pixels of {bits} bits of a kind that is not read")
+        }
+        Some(UnsupportedErrorKind::GenericFeature(what)) => what,
+        _ => error.source().map_or(error.to_string(), |e| e.to_string()),
+    };
     PictureError::Unreadable { format, why }
 }
 

@@ -1,3 +1,7 @@
+//! Reading, writing, metadata.
+
+mod kinds;
+
 use super::*;
 use image::{DynamicImage, ImageFormat};
 use std::io::Cursor;
@@ -79,59 +83,6 @@ fn a_thin_coloured_line_keeps_its_colour_in_jpeg() {
         r.abs_diff(213) < 12 && g.abs_diff(94) < 12 && b < 24,
         "{r} {g} {b}"
     );
-}
-
-#[test]
-fn tiff_of_eight_bits_keeps_every_pixel() {
-    let picture = ramp(33, 21);
-    let colour = encoded(&rgb_image(&picture), ImageFormat::Tiff);
-    assert_eq!(Picture::decode(&colour).unwrap(), picture);
-    let grey = DynamicImage::ImageLuma8(image::GrayImage::from_fn(9, 4, |x, y| {
-        image::Luma([u8::try_from(x * 20 + y).unwrap()])
-    }));
-    let grey = Picture::decode(&encoded(&grey, ImageFormat::Tiff)).unwrap();
-    assert_eq!(grey.colour(8, 3), Some([163, 163, 163]));
-}
-
-#[test]
-fn transparency_is_dropped() {
-    let image = image::RgbaImage::from_pixel(5, 4, image::Rgba([10, 20, 30, 0]));
-    for format in [ImageFormat::Png, ImageFormat::Tiff] {
-        let bytes = encoded(&DynamicImage::ImageRgba8(image.clone()), format);
-        let picture = Picture::decode(&bytes).unwrap();
-        assert_eq!(picture.colour(2, 2), Some([10, 20, 30]));
-        assert_eq!(picture.rgba()[3], 255);
-    }
-}
-
-/// Of 1000 samples 1000, 1001 ... 1999, the 0.5th percentile is 1004 and the 99.5th 1994.
-#[test]
-fn sixteen_bits_are_stretched_between_the_percentiles() {
-    let image = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(100, 10, |x, y| {
-        image::Luma([1000 + u16::try_from(y * 100 + x).unwrap()])
-    });
-    for format in [ImageFormat::Png, ImageFormat::Tiff] {
-        let bytes = encoded(&DynamicImage::ImageLuma16(image.clone()), format);
-        let picture = Picture::decode(&bytes).unwrap();
-        let grey = |value: u32| picture.colour(value % 100, value / 100).unwrap()[0];
-        assert_eq!([grey(0), grey(4), grey(994), grey(999)], [0, 0, 255, 255]);
-        assert_eq!(grey(499), 128); // (1499 - 1004) / 990 of 255 is 127.5.
-        assert_eq!((grey(5), grey(8)), (0, 1));
-    }
-}
-
-#[test]
-fn colours_of_sixteen_bits_share_one_stretch() {
-    let image = image::ImageBuffer::<image::Rgb<u16>, _>::from_fn(30, 30, |x, _| {
-        image::Rgb(if x < 15 {
-            [0, 0, 0]
-        } else {
-            [40_000, 20_000, 10_000]
-        })
-    });
-    let bytes = encoded(&DynamicImage::ImageRgb16(image), ImageFormat::Png);
-    let picture = Picture::decode(&bytes).unwrap();
-    assert_eq!(picture.colour(20, 3), Some([255, 128, 64]));
 }
 
 #[test]

@@ -173,7 +173,7 @@ fn properties(extent: &Rect<f64>, local: &str) -> String {
 }
 
 /// The system a map of the site is shown in, so that a circle is round: UTM on Earth, and where
-/// there is none, an azimuthal one about the site's origin.
+/// there is none, a transverse Mercator about the site's origin.
 pub(in crate::publish) fn local_crs(site: &Site) -> String {
     let (origin, planet) = (site.origin(), site.planet());
     let (lat, lon) = (origin.lat_deg(), origin.lon_deg());

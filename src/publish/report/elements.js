@@ -19,6 +19,18 @@ function byId(id) {
   return document.getElementById(id);
 }
 
+// The button that switches between light and dark; `repaint` does what no style sheet does then.
+function themeButton(repaint = () => {}) {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  dark.addEventListener("change", repaint);
+  byId("theme").addEventListener("click", () => {
+    const root = document.documentElement;
+    const now = root.dataset.theme ?? (dark.matches ? "dark" : "light");
+    root.dataset.theme = now === "dark" ? "light" : "dark";
+    repaint();
+  });
+}
+
 // A number with so many significant digits, or a dash where there is none.
 function digits(x, n = 3) {
   if (x === null || x === undefined || Number.isNaN(x)) return "\u2013";

@@ -17,29 +17,46 @@ use serde_json::Value;
 use super::{Product, Rock, Scene};
 use crate::input::Reject;
 
-/// The page, with a place for everything in it.
-const PAGE: &str = include_str!("report.html");
+/// What every page has, with a place for everything in it.
+const PAGE: &str = include_str!("page.html");
 /// Its style.
 const STYLE: &str = include_str!("report.css");
-/// Its scripts, in the order in which they stand in the page.
-const SCRIPTS: [&str; 8] = [
-    include_str!("elements.js"),
-    include_str!("data.js"),
-    include_str!("grid.js"),
-    include_str!("map.js"),
-    include_str!("rock.js"),
-    include_str!("charts.js"),
-    include_str!("changes.js"),
-    include_str!("page.js"),
-];
-/// The page of a comparison by itself, and its scripts.
-const CHANGES_PAGE: &str = include_str!("changes.html");
-const CHANGES_SCRIPTS: [&str; 4] = [
-    include_str!("elements.js"),
-    include_str!("charts.js"),
-    include_str!("changes.js"),
-    include_str!("changes_page.js"),
-];
+
+/// What a kind of page has of its own.
+struct Kind {
+    name: &'static str,
+    /// The elements that its scripts fill.
+    body: &'static str,
+    /// In the order in which they stand in the page.
+    scripts: &'static [&'static str],
+}
+
+/// The report of a run.
+const REPORT: Kind = Kind {
+    name: "report",
+    body: include_str!("report.html"),
+    scripts: &[
+        include_str!("elements.js"),
+        include_str!("data.js"),
+        include_str!("grid.js"),
+        include_str!("map.js"),
+        include_str!("rock.js"),
+        include_str!("charts.js"),
+        include_str!("changes.js"),
+        include_str!("page.js"),
+    ],
+};
+/// A comparison by itself.
+const COMPARISON: Kind = Kind {
+    name: "compare",
+    body: include_str!("changes.html"),
+    scripts: &[
+        include_str!("elements.js"),
+        include_str!("charts.js"),
+        include_str!("changes.js"),
+        include_str!("changes_page.js"),
+    ],
+};
 /// What stands around the data in a page.
 const DATA_MARKS: (&str, &str) = ("id=\"data\">", "</script>");
 
@@ -63,7 +80,7 @@ impl Scene<'_> {
     /// report.html.
     pub fn report(&self, rocks: &[Rock], run: &Run<'_>) -> Product {
         let data = serde_json::to_string(&data::page(self, rocks, run)).unwrap_or_default();
-        Product::new("report.html", page(run.title, &data))
+        Product::new("report.html", REPORT.page(run.title, &data))
     }
 }
 
@@ -84,44 +101,39 @@ pub fn with_changes(mut report: Value, changes: Value) -> String {
     }
     report["changes"] = changes;
     let title = report["title"].as_str().unwrap_or("map").to_owned();
-    page(&title, &report.to_string())
+    REPORT.page(&title, &report.to_string())
 }
 
 /// A page of what changed, by itself.
 pub fn changes_page(title: &str, changes: &Value) -> String {
     let data = serde_json::json!({ "changes": changes }).to_string();
-    filled(CHANGES_PAGE, title, &data, &CHANGES_SCRIPTS)
+    COMPARISON.page(title, &data)
 }
 
-/// The page of these data.
-fn page(title: &str, data: &str) -> String {
-    filled(PAGE, title, data, &SCRIPTS)
-}
-
-fn filled(template: &str, title: &str, data: &str, of: &[&str]) -> String {
-    // Within a script "<" could end it.
-    let data = data.replace('<', "\\u003c");
-    let mut scripts = String::from("\"use strict\";\n");
-    for script in of {
-        scripts.push_str(script);
+impl Kind {
+    /// The page of these data.
+    fn page(&self, title: &str, data: &str) -> String {
+        let title = escaped(title);
+        let parts = [
+            ("{{title}}", title.clone()),
+            ("{{kind}}", self.name.to_owned()),
+            ("{{style}}", STYLE.to_owned()),
+            ("{{body}}", self.body.replacen("{{heading}}", &title, 1)),
+            // Within a script "<" could end it.
+            ("{{data}}", data.replace('<', "\\u003c")),
+            ("{{scripts}}", self.scripts.concat()),
+        ];
+        let mut rest = PAGE;
+        let mut html = String::with_capacity(data.len() + 100_000);
+        for (name, content) in parts {
+            let (before, after) = rest.split_once(name).unwrap_or((rest, ""));
+            html.push_str(before);
+            html.push_str(&content);
+            rest = after;
+        }
+        html.push_str(rest);
+        html
     }
-    let mut rest = template;
-    let mut html = String::with_capacity(data.len() + 100_000);
-    let parts = [
-        ("{{title}}", escaped(title)),
-        ("{{style}}", STYLE.to_owned()),
-        ("{{heading}}", escaped(title)),
-        ("{{data}}", data),
-        ("{{scripts}}", scripts),
-    ];
-    for (name, content) in parts {
-        let (before, after) = rest.split_once(name).unwrap_or((rest, ""));
-        html.push_str(before);
-        html.push_str(&content);
-        rest = after;
-    }
-    html.push_str(rest);
-    html
 }
 
 /// Text as HTML shows it.

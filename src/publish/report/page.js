@@ -263,17 +263,9 @@ function controls() {
     if (i >= 0) choose(i, true);
     else byId("said").textContent = `No rock is called ${wanted || "nothing"}.`;
   });
-  const dark = matchMedia("(prefers-color-scheme: dark)");
-  const repaint = () => {
+  themeButton(() => {
     map.colours();
     legend();
-  };
-  dark.addEventListener("change", repaint);
-  byId("theme").addEventListener("click", () => {
-    const root = document.documentElement;
-    const now = root.dataset.theme ?? (dark.matches ? "dark" : "light");
-    root.dataset.theme = now === "dark" ? "light" : "dark";
-    repaint();
   });
 }
 

@@ -1,6 +1,7 @@
 use geo::LineString;
 
 use super::super::layer::{Column, Kind};
+use super::super::mosaic::MosaicScale;
 use super::*;
 
 fn layer(planet: Planet, geometry: Geometry, times: &[&str]) -> Layer {
@@ -79,4 +80,34 @@ fn without_time_or_place_there_is_no_item() {
     assert!(item(Planet::EARTH, &[layer(Planet::EARTH, area, &["never"])]).is_none());
     let nowhere = Geometry::Lines(vec![LineString::<f64>::new(Vec::new()).0]);
     assert!(item(Planet::EARTH, &[layer(Planet::EARTH, nowhere, &["1"])]).is_none());
+}
+
+#[test]
+fn the_mosaic_names_its_own_system_and_pixels() {
+    let files = ["rocks.geojson", "mosaic.tif"];
+    let about = |crs: &str| {
+        let grid = MosaicGrid {
+            crs: crs.to_owned(),
+            west_m: 500_000.0,
+            north_m: 7_000_000.0,
+            scale: MosaicScale { m_per_px: 0.05 },
+            columns: 700,
+            rows: 300,
+        };
+        let [rocks, mosaic] = files.map(|f| Asset::of(f).unwrap().on_grid(Some(&grid)).json());
+        assert!(rocks.get("proj:shape").is_none() && rocks.get("proj:code").is_none());
+        mosaic
+    };
+    let in_zone = about("EPSG:32719");
+    assert_eq!(in_zone["proj:code"], "EPSG:32719");
+    assert_eq!(in_zone["proj:shape"], json!([300, 700]));
+    assert_eq!(
+        in_zone["proj:transform"],
+        json!([0.05, 0.0, 500_000.0, 0.0, -0.05, 7_000_000.0])
+    );
+    let local = about("+proj=tmerc +lat_0=4.5 +lon_0=137.4 +R=3396190 +units=m +type=crs");
+    assert_eq!(local["proj:code"], Json::Null);
+    assert_eq!(local["proj:projjson"]["type"], "ProjectedCRS");
+    let plain = Asset::of("mosaic.tif").unwrap().on_grid(None).json();
+    assert!(plain.get("proj:shape").is_none());
 }
