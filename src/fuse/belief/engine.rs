@@ -10,6 +10,7 @@ use super::data::{Look, Platform, PoseNow, looks, order, platforms};
 use super::expect::{Expected, expect};
 use super::ground::SmoothGround;
 use super::noise::{Scales, ln_add, variances};
+use super::shape::Shape;
 use super::single::Singleton;
 use super::{BeliefSettings, PoseCorrection};
 use crate::adjust::{Problem, Surface};
@@ -75,6 +76,8 @@ pub(super) struct Model {
     pub(super) height_variance: f64,
     /// Logarithms of sizes of objects, metres.
     pub(super) size: Normal,
+    /// How they depart from it.
+    pub(super) size_shape: Shape,
     /// Logarithms of apparent sizes of clutter, pixels.
     pub(super) clutter_size: Normal,
     /// Clutter a view.
@@ -181,6 +184,7 @@ impl<'a> Engine<'a> {
                 mean: 0.0,
                 variance: 0.4,
             },
+            size_shape: Shape::NORMAL,
             clutter_size: Normal {
                 mean: 0.0,
                 variance: 1.0,
@@ -337,8 +341,9 @@ impl<'a> Engine<'a> {
         pull[3] = -away / vs;
         information[0][0] += FAINT;
         information[1][1] += FAINT;
-        let ln_density =
-            -0.5 * height_m * height_m / vz - 0.5 * (2.0 * PI * vz).ln() + self.model.size.ln(x[3]);
+        let size = &self.model.size;
+        let ln_size = size.ln(x[3]) + self.model.size_shape.ln_ratio(size, x[3]);
+        let ln_density = -0.5 * height_m * height_m / vz - 0.5 * (2.0 * PI * vz).ln() + ln_size;
         Prior {
             information,
             pull,

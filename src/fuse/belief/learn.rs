@@ -2,10 +2,11 @@
 //! expectation maximisation.
 
 use super::algebra::{self, Square6};
-use super::engine::{Engine, START_CLUTTER, START_TRANSIENTS, Scores};
+use super::engine::{Engine, Normal, START_CLUTTER, START_TRANSIENTS, Scores};
 use super::evidence::{Evidence, probability};
 use super::looks::Repeats;
 use super::noise::robust_weight;
+use super::shape::Shape;
 use super::single::LEAST_SCORE_VARIANCE;
 
 /// The stated noise counts for this many readings.
@@ -61,6 +62,39 @@ impl Moments {
 
     fn scatter(&self) -> f64 {
         (self.squares - self.sum * self.sum / self.n).max(0.0)
+    }
+}
+
+/// How likely objects are detected at all.
+struct Chances {
+    /// Logarithm of the probability that every view misses it.
+    missed: Vec<f64>,
+    /// Sum of the views' odds of detecting it.
+    odds: Vec<f64>,
+}
+
+impl Chances {
+    /// Probabilities are taken to be no less than this.
+    const LEAST: f64 = 0.2;
+
+    fn new(evidence: &Evidence, n_objects: usize) -> Self {
+        let (mut missed, mut odds) = (vec![0.0; n_objects], vec![0.0; n_objects]);
+        for (pair, worth) in evidence.expectation.pairs.iter().zip(&evidence.worth) {
+            missed[pair.object] += worth * (-pair.p_detect).ln_1p();
+            odds[pair.object] += worth * pair.p_detect / (1.0 - pair.p_detect);
+        }
+        Self { missed, odds }
+    }
+
+    /// That a view detects it.
+    fn once(&self, object: usize) -> f64 {
+        (1.0 - self.missed[object].exp()).clamp(Self::LEAST, 1.0)
+    }
+
+    /// That two views do.
+    fn twice(&self, object: usize) -> f64 {
+        let fewer = self.missed[object].exp() * (1.0 + self.odds[object]);
+        (1.0 - fewer).clamp(Self::LEAST, 1.0)
     }
 }
 
@@ -215,15 +249,8 @@ impl Engine<'_> {
         let n_views = self.n_views() as f64 + 1.0;
         self.model.clutter = clutter / n_views;
         self.model.transients = transients / n_views / self.view_area_m2;
-        let mut missed = vec![0.0; self.objects.len()];
-        for (pair, worth) in evidence.expectation.pairs.iter().zip(&evidence.worth) {
-            missed[pair.object] += worth * (-pair.p_detect).ln_1p();
-        }
-        let whole: Vec<f64> = real
-            .iter()
-            .zip(&missed)
-            .map(|(r, m)| r / (1.0 - m.exp()).clamp(0.2, 1.0))
-            .collect();
+        let chances = Chances::new(evidence, self.objects.len());
+        let whole: Vec<f64> = (0..real.len()).map(|k| real[k] / chances.once(k)).collect();
         self.set_density(whole.iter().sum::<f64>().max(1.0) / self.area_m2);
         if !self.has_sizes {
             return;
@@ -235,7 +262,19 @@ impl Engine<'_> {
             .map(|(r, _)| r)
             .sum();
         if real.iter().sum::<f64>() > 5.0 {
-            self.learn_sizes(&whole, support, corroborated > 10.0);
+            let weights: Vec<f64> = if corroborated > 10.0 {
+                let twice = |k: usize| {
+                    if support[k] > 1.5 {
+                        real[k] / chances.twice(k)
+                    } else {
+                        0.0
+                    }
+                };
+                (0..real.len()).map(twice).collect()
+            } else {
+                whole
+            };
+            self.learn_sizes(&weights);
         }
         let total: f64 = sizes.iter().map(|s| s.0).sum();
         if total > 5.0 {
@@ -250,27 +289,25 @@ impl Engine<'_> {
         }
     }
 
-    fn learn_sizes(&mut self, whole: &[f64], support: &[f64], corroborated_alone: bool) {
-        let weight = |k: usize| {
-            if corroborated_alone && support[k] <= 1.5 {
-                0.0
-            } else {
-                whole[k]
-            }
-        };
+    fn learn_sizes(&mut self, weights: &[f64]) {
         let law = self.model.size;
         let (mut n, mut sum) = (SIZE_COUNT, SIZE_COUNT * law.mean);
-        for (k, x) in self.objects.iter().enumerate() {
-            n += weight(k);
-            sum += weight(k) * x[3];
+        for (weight, x) in weights.iter().zip(&self.objects) {
+            n += weight;
+            sum += weight * x[3];
         }
         let mean = sum / n;
         let mut scatter = SIZE_COUNT * law.variance;
-        for (k, x) in self.objects.iter().enumerate() {
-            scatter += weight(k) * ((x[3] - mean).powi(2) + self.object_cov[k][3][3]);
+        for ((weight, x), cov) in weights.iter().zip(&self.objects).zip(&self.object_cov) {
+            scatter += weight * ((x[3] - mean).powi(2) + cov[3][3]);
         }
-        self.model.size.mean = mean;
-        self.model.size.variance = (scatter / n).clamp(SIZE_VARIANCES.0, SIZE_VARIANCES.1);
+        let size = Normal {
+            mean,
+            variance: (scatter / n).clamp(SIZE_VARIANCES.0, SIZE_VARIANCES.1),
+        };
+        let sizes = weights.iter().zip(&self.objects).map(|(w, x)| (*w, x[3]));
+        self.model.size_shape = Shape::learnt(&size, sizes);
+        self.model.size = size;
     }
 
     /// Scores of objects and of clutter. Where a detection's object is judged real or not, its own
@@ -308,8 +345,9 @@ impl Engine<'_> {
         });
     }
 
-    /// Hits and misses of real objects that other views saw too: leaving the view itself out of the
-    /// choice keeps it free of bias.
+    /// Hits and misses of objects that other views saw too, by their probability of being real:
+    /// leaving the view itself out of the choice keeps it free of bias, and so does asking no more
+    /// of an object than that, since one that many views missed is the less believed for it.
     fn learn_curve(&mut self, evidence: &Evidence, real: &[f64], support: &[f64]) {
         let pairs = &evidence.expectation.pairs;
         let chances = pairs
@@ -318,7 +356,7 @@ impl Engine<'_> {
             .zip(&evidence.worth)
             .filter(|((pair, q), _)| {
                 let k = pair.object;
-                support[k] - *q > 0.8 && real[k] > 0.5 && pair.inside > 0.7
+                support[k] - *q > 0.8 && pair.inside > 0.7
             })
             .map(|((pair, q), worth)| {
                 let weight = real[pair.object] * worth;

@@ -117,6 +117,7 @@
 //! | `single` | what one detection says by itself; where everything starts | 0 |
 //! | `curve` | how often objects are detected, by apparent size or range | 3.1 |
 //! | `classes` | of which class an object is, where the detector takes classes for each other | |
+//! | `shape` | how sizes of objects depart from a lognormal law | |
 //! | `near` | objects near a place | |
 //! | `pairs` | which objects a view expects, and which detections may be of them | 3.1 |
 //! | `looks` | how many independent looks a row of looks is worth | 3.x |
@@ -153,6 +154,7 @@ mod outcome;
 mod pairs;
 mod register;
 mod sequence;
+mod shape;
 mod single;
 mod solve;
 #[cfg(test)]
