@@ -31,9 +31,6 @@ const CLUTTER_VARIANCES: (f64, f64) = (0.05, 2.0);
 /// That scores say nothing counts for this many detections of each kind.
 const SCORE_COUNT: f64 = 3.0;
 
-/// How much of its own score counts where it is judged which kind a detection is.
-const OWN_SCORE: f64 = 0.8;
-
 /// Weighted moments about a first guess that counts for some weight.
 struct Moments {
     n: f64,
@@ -310,9 +307,7 @@ impl Engine<'_> {
         self.model.size = size;
     }
 
-    /// Scores of objects and of clutter. Where a detection's object is judged real or not, its own
-    /// score counts a little less than it would: where nothing else tells objects from clutter, what
-    /// scores say fades round by round instead of confirming itself.
+    /// Scores of objects and of clutter.
     fn learn_scores(&mut self, evidence: &Evidence) {
         let Some(scores) = self.model.scores else {
             return;
@@ -321,12 +316,11 @@ impl Engine<'_> {
         let mut object = Moments::new(SCORE_COUNT, overall);
         let mut clutter = Moments::new(SCORE_COUNT, overall);
         let mut unowned = vec![1.0; self.looks.len()];
-        for (edge, worth) in self.edges.iter().zip(&evidence.edge_worth) {
+        for edge in &self.edges {
             let look = &self.looks[edge.look];
             let Some(logit) = look.logit else { continue };
             unowned[edge.look] -= edge.weight;
-            let own = (1.0 - OWN_SCORE) * edge.weight * worth * self.score_odds(look);
-            let real = probability(evidence.log_odds[edge.object] - own);
+            let real = probability(evidence.log_odds[edge.object]);
             object.add(edge.weight * real, logit);
             clutter.add(edge.weight * (1.0 - real), logit);
         }
