@@ -183,26 +183,58 @@ fn is_wanted(name: &str) -> bool {
     filters.is_empty() || filters.iter().any(|f| name.contains(f.as_str()))
 }
 
-/// The number of views of a scene, and the least seconds of some fusions of it.
-fn time(name: &str, scene: &Scene, fusions: usize) -> (f64, f64) {
-    let (pool, start) = (one_thread(), Instant::now());
-    let data = Data::new(scene);
-    let mut least_s = f64::INFINITY;
-    for _ in 0..fusions {
-        let before_s = seconds(start);
-        let belief = data.fuse(&pool);
-        let this_s = seconds(start) - before_s;
-        println!(
-            "{name}: {} views, {} detections: {this_s:.3} s, {} starts, {} rounds",
-            data.inputs.views.len(),
-            data.measurements.len(),
-            belief.evidence.n_starts,
-            belief.evidence.rounds,
-        );
-        least_s = least_s.min(this_s);
+/// What fusions of a scene came to.
+struct Timed {
+    views: f64,
+    /// The least of some.
+    seconds: f64,
+    /// How often registration was done: where it left doubt, more than once.
+    starts: f64,
+}
+
+impl Timed {
+    fn new(name: &str, scene: &Scene, fusions: usize) -> Self {
+        let (pool, start) = (one_thread(), Instant::now());
+        let data = Data::new(scene);
+        let mut timed = Self {
+            views: number(data.inputs.views.len()),
+            seconds: f64::INFINITY,
+            starts: 1.0,
+        };
+        for _ in 0..fusions {
+            let before_s = seconds(start);
+            let belief = data.fuse(&pool);
+            let this_s = seconds(start) - before_s;
+            println!(
+                "{name}: {} views, {} detections: {this_s:.3} s, {} starts, {} rounds",
+                data.inputs.views.len(),
+                data.measurements.len(),
+                belief.evidence.n_starts,
+                belief.evidence.rounds,
+            );
+            timed.seconds = timed.seconds.min(this_s);
+            timed.starts = number(belief.evidence.n_starts);
+        }
+        timed
     }
-    let views = f64::from(u32::try_from(data.inputs.views.len()).expect("few views"));
-    (views, least_s)
+
+    /// One registration with its rounds.
+    fn start(&self) -> Self {
+        Self {
+            views: self.views,
+            seconds: self.seconds / self.starts,
+            starts: 1.0,
+        }
+    }
+
+    /// The power of the number of views with which seconds grow from one length to this.
+    fn growth_from(&self, before: &Self) -> f64 {
+        (self.seconds / before.seconds).ln() / (self.views / before.views).ln()
+    }
+}
+
+fn number(count: usize) -> f64 {
+    f64::from(u32::try_from(count).expect("few views"))
 }
 
 /// Traverses of 45 to 4500 views: seconds, and the exponent of their growth from each to the next
@@ -211,55 +243,52 @@ fn lengths(_: &mut Criterion) {
     if !is_wanted("lengths") {
         return;
     }
-    let mut all: Vec<(f64, f64)> = Vec::new();
+    let mut all: Vec<Timed> = Vec::new();
     for times in [1, 3, 10, 30, 100] {
-        let this = time("lengths", &scene(times), if times <= 10 { 3 } else { 1 });
-        if let Some(&before) = all.last() {
-            println!("lengths: growth {:.2}", growth(before, this));
+        let this = Timed::new("lengths", &scene(times), if times <= 10 { 3 } else { 1 });
+        if let Some(before) = all.last() {
+            println!("lengths: growth {:.2}", this.growth_from(before));
         }
         all.push(this);
     }
-    if let [first, .., last] = all[..] {
-        println!(
-            "lengths: growth from first to last {:.2}",
-            growth(first, last)
-        );
+    if let [first, .., last] = &all[..] {
+        let growth = last.growth_from(first);
+        println!("lengths: growth from first to last {growth:.2}");
     }
 }
 
-/// Traverses of 45 to 4500 views that return: seconds, how many times those of a straight one of as
-/// many views that is, and the exponent of their growth from the first to the last.
+/// Traverses of 45 to 4500 views that return: how many times as long one registration with its
+/// rounds takes as that of a straight traverse of as many views, and the exponent of its growth from
+/// the first to the last.
 fn returning(_: &mut Criterion) {
     if !is_wanted("returning") {
         return;
     }
-    let mut all: Vec<[(f64, f64); 3]> = Vec::new();
+    let mut all: Vec<[Timed; 3]> = Vec::new();
     for times in [1, 10, 33, 100] {
         let fusions = if times <= 10 { 3 } else { 1 };
-        let straight = time("returning: straight", &scene(times), fusions);
-        let back = along(times, out_and_back);
-        let back = time("returning: out and back", &back, fusions);
-        let mower = time("returning: lines", &along(times, lines), fusions);
+        let these = [
+            ("straight", scene(times)),
+            ("out and back", along(times, out_and_back)),
+            ("lines", along(times, lines)),
+        ]
+        .map(|(name, scene)| Timed::new(&format!("returning: {name}"), &scene, fusions).start());
+        let [straight, back, mower] = &these;
         println!(
-            "returning: {} views, of a straight one: out and back {:.2}, lines {:.2}",
-            straight.0,
-            back.1 / straight.1,
-            mower.1 / straight.1
+            "returning: {} views, times a straight one: out and back {:.2}, lines {:.2}",
+            straight.views,
+            back.seconds / straight.seconds,
+            mower.seconds / straight.seconds
         );
-        all.push([straight, back, mower]);
+        all.push(these);
     }
-    if let [first, .., last] = all[..] {
-        let [straight, back, mower] = [0, 1, 2].map(|i| growth(first[i], last[i]));
+    if let [first, .., last] = &all[..] {
+        let [straight, back, mower] = [0, 1, 2].map(|i| last[i].growth_from(&first[i]));
         println!(
             "returning: growth from first to last: straight {straight:.2}, out and back {back:.2}, \
              lines {mower:.2}"
         );
     }
-}
-
-/// The power of the number of views with which seconds grow between two lengths.
-fn growth(before: (f64, f64), after: (f64, f64)) -> f64 {
-    (after.1 / before.1).ln() / (after.0 / before.0).ln()
 }
 
 criterion_group!(benches, default_scene, lengths, returning);

@@ -380,7 +380,16 @@ mod tests {
             row - column < 3 || (row + column).abs_diff(n) < 3
         });
         agrees::<6>(n, |row, column| row - column < 4 || row - column > n - 4);
-        let place = |i: usize| (i / 8, if (i / 8) % 2 == 0 { i % 8 } else { 7 - i % 8 });
+        let place = |i: usize| {
+            (
+                i / 8,
+                if (i / 8).is_multiple_of(2) {
+                    i % 8
+                } else {
+                    7 - i % 8
+                },
+            )
+        };
         agrees::<4>(n, |row, column| {
             let ((a, b), (c, d)) = (place(row), place(column));
             a.abs_diff(c) < 2 && b.abs_diff(d) < 2
