@@ -1,5 +1,5 @@
-//! Belief fusion on one thread: the default scene, and how the time grows with the length of a
-//! traverse.
+//! Belief fusion on one thread: the default scene, how the time grows with the length of a traverse,
+//! and what it costs where the traverse returns to where it has been.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -10,11 +10,17 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use rockmap::adjust::{Measurement, Problem};
 use rockmap::fuse::belief::{Belief, BeliefSettings, fuse_belief};
 use rockmap::pipeline::{self, Config, Inputs, Overrides, Silent};
-use rockmap::simulate::{self, Scene};
+use rockmap::simulate::{self, Path as Way, Scene};
 
 /// Metres of rocks before the first station and beyond the last.
 const BEFORE_M: f64 = 2.0;
 const BEYOND_M: f64 = 10.0;
+/// Metres of rocks around a traverse that returns.
+const AROUND_M: f64 = 12.0;
+/// Metres between the ways out and back.
+const BACK_BESIDE_M: f64 = 3.0;
+/// Metres between the lines of a lawn-mower.
+const LINES_M: f64 = 6.0;
 
 /// What fusion is given of a scene.
 struct Data {
@@ -78,6 +84,52 @@ fn scene(times: u32) -> Scene {
     scene
 }
 
+/// The default scene so many times as long, along legs between places, with as many rocks a square
+/// metre.
+fn along(times: u32, legs: impl Fn(f64) -> Vec<[f64; 2]>) -> Scene {
+    let mut scene = scene(times);
+    let platform = &mut scene.platforms[0];
+    let stations = u32::try_from(platform.stations).expect("few stations");
+    let places = legs(f64::from(stations) * platform.spacing_m);
+    let area = &mut scene.rocks.area;
+    let before_m2 = area.size_m2();
+    let least = |i: usize| places.iter().map(|p| p[i]).fold(f64::INFINITY, f64::min);
+    let most = |i: usize| {
+        places
+            .iter()
+            .map(|p| p[i])
+            .fold(f64::NEG_INFINITY, f64::max)
+    };
+    (area.west_m, area.east_m) = (least(0) - AROUND_M, most(0) + AROUND_M);
+    (area.south_m, area.north_m) = (least(1) - AROUND_M, most(1) + AROUND_M);
+    let more = area.size_m2() / before_m2;
+    platform.path = Way::Waypoints(places);
+    scene.rocks.number = scaled(scene.rocks.number, more);
+    scene
+}
+
+/// Out, and back beside it.
+fn out_and_back(length_m: f64) -> Vec<[f64; 2]> {
+    let far_m = 0.5 * length_m;
+    let beside_m = BACK_BESIDE_M;
+    vec![[0.0, 0.0], [far_m, 0.0], [far_m, beside_m], [0.0, beside_m]]
+}
+
+/// To and fro in lines that fill a square.
+fn lines(length_m: f64) -> Vec<[f64; 2]> {
+    let n_lines = (length_m / LINES_M).sqrt().round().max(2.0);
+    let line_m = length_m / n_lines;
+    let mut places = Vec::new();
+    let (mut north_m, mut from_m, mut to_m) = (0.0, 0.0, line_m);
+    // One line more, as the ways between the lines are travelled too: the last is not finished.
+    while north_m <= n_lines * LINES_M {
+        places.extend([[from_m, north_m], [to_m, north_m]]);
+        std::mem::swap(&mut from_m, &mut to_m);
+        north_m += LINES_M;
+    }
+    places
+}
+
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -122,52 +174,122 @@ fn seconds(start: Instant) -> f64 {
     }
 }
 
-/// Traverses of 45 to 4500 views: seconds, and the exponent of their growth from each to the next
-/// and from the first to the last. A filter that does not name them leaves them out.
-fn lengths(_: &mut Criterion) {
+/// Whether the command line asks for a part: a filter that does not name it leaves it out.
+fn is_wanted(name: &str) -> bool {
     let filters: Vec<String> = std::env::args()
         .skip(1)
         .filter(|a| !a.starts_with('-'))
         .collect();
-    if !(filters.is_empty() || filters.iter().any(|f| "lengths".contains(f.as_str()))) {
-        return;
-    }
-    let (pool, start) = (one_thread(), Instant::now());
-    let mut all: Vec<(f64, f64)> = Vec::new();
-    for times in [1, 3, 10, 30, 100] {
-        let data = Data::new(&scene(times));
-        let mut least_s = f64::INFINITY;
-        for _ in 0..if times <= 10 { 3 } else { 1 } {
+    filters.is_empty() || filters.iter().any(|f| name.contains(f.as_str()))
+}
+
+/// What fusions of a scene came to.
+struct Timed {
+    views: f64,
+    /// The least of some.
+    seconds: f64,
+    /// How often registration was done: where it left doubt, more than once.
+    starts: f64,
+}
+
+impl Timed {
+    fn new(name: &str, scene: &Scene, fusions: usize) -> Self {
+        let (pool, start) = (one_thread(), Instant::now());
+        let data = Data::new(scene);
+        let mut timed = Self {
+            views: number(data.inputs.views.len()),
+            seconds: f64::INFINITY,
+            starts: 1.0,
+        };
+        for _ in 0..fusions {
             let before_s = seconds(start);
             let belief = data.fuse(&pool);
             let this_s = seconds(start) - before_s;
             println!(
-                "lengths: {} views, {} detections: {this_s:.3} s, {} starts, {} rounds",
+                "{name}: {} views, {} detections: {this_s:.3} s, {} starts, {} rounds",
                 data.inputs.views.len(),
                 data.measurements.len(),
                 belief.evidence.n_starts,
                 belief.evidence.rounds,
             );
-            least_s = least_s.min(this_s);
+            timed.seconds = timed.seconds.min(this_s);
+            timed.starts = number(belief.evidence.n_starts);
         }
-        let views = f64::from(u32::try_from(data.inputs.views.len()).expect("few views"));
-        if let Some(&before) = all.last() {
-            println!("lengths: growth {:.2}", growth(before, (views, least_s)));
-        }
-        all.push((views, least_s));
+        timed
     }
-    if let [first, .., last] = all[..] {
+
+    /// One registration with its rounds.
+    fn start(&self) -> Self {
+        Self {
+            views: self.views,
+            seconds: self.seconds / self.starts,
+            starts: 1.0,
+        }
+    }
+
+    /// The power of the number of views with which seconds grow from one length to this.
+    fn growth_from(&self, before: &Self) -> f64 {
+        (self.seconds / before.seconds).ln() / (self.views / before.views).ln()
+    }
+}
+
+fn number(count: usize) -> f64 {
+    f64::from(u32::try_from(count).expect("few views"))
+}
+
+/// Traverses of 45 to 4500 views: seconds, and the exponent of their growth from each to the next
+/// and from the first to the last.
+fn lengths(_: &mut Criterion) {
+    if !is_wanted("lengths") {
+        return;
+    }
+    let mut all: Vec<Timed> = Vec::new();
+    for times in [1, 3, 10, 30, 100] {
+        let this = Timed::new("lengths", &scene(times), if times <= 10 { 3 } else { 1 });
+        if let Some(before) = all.last() {
+            println!("lengths: growth {:.2}", this.growth_from(before));
+        }
+        all.push(this);
+    }
+    if let [first, .., last] = &all[..] {
+        let growth = last.growth_from(first);
+        println!("lengths: growth from first to last {growth:.2}");
+    }
+}
+
+/// Traverses of 45 to 4500 views that return: how many times as long one registration with its
+/// rounds takes as that of a straight traverse of as many views, and the exponent of its growth from
+/// the first to the last.
+fn returning(_: &mut Criterion) {
+    if !is_wanted("returning") {
+        return;
+    }
+    let mut all: Vec<[Timed; 3]> = Vec::new();
+    for times in [1, 10, 33, 100] {
+        let fusions = if times <= 10 { 3 } else { 1 };
+        let these = [
+            ("straight", scene(times)),
+            ("out and back", along(times, out_and_back)),
+            ("lines", along(times, lines)),
+        ]
+        .map(|(name, scene)| Timed::new(&format!("returning: {name}"), &scene, fusions).start());
+        let [straight, back, mower] = &these;
         println!(
-            "lengths: growth from first to last {:.2}",
-            growth(first, last)
+            "returning: {} views, times a straight one: out and back {:.2}, lines {:.2}",
+            straight.views,
+            back.seconds / straight.seconds,
+            mower.seconds / straight.seconds
+        );
+        all.push(these);
+    }
+    if let [first, .., last] = &all[..] {
+        let [straight, back, mower] = [0, 1, 2].map(|i| last[i].growth_from(&first[i]));
+        println!(
+            "returning: growth from first to last: straight {straight:.2}, out and back {back:.2}, \
+             lines {mower:.2}"
         );
     }
 }
 
-/// The power of the number of views with which seconds grow between two lengths.
-fn growth(before: (f64, f64), after: (f64, f64)) -> f64 {
-    (after.1 / before.1).ln() / (after.0 / before.0).ln()
-}
-
-criterion_group!(benches, default_scene, lengths);
+criterion_group!(benches, default_scene, lengths, returning);
 criterion_main!(benches);

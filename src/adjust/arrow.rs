@@ -3,7 +3,11 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::envelope::{Envelope, Factor};
+use super::selected_inverse::SelectedInverse;
+use super::sparse::{BlockMatrix, Factor};
+
+/// The eliminated and the kept unknown, and the block in the rows of the former.
+type Coupling<const A: usize, const B: usize> = (usize, usize, SMatrix<f64, B, A>);
 
 /// `[[K, B^T], [B, E]] [x; y] = [k; e]` with K and E block diagonal.
 #[derive(Debug)]
@@ -13,7 +17,7 @@ pub(crate) struct Arrow<const A: usize, const B: usize> {
     /// Blocks of the unknowns to eliminate, and their right-hand sides.
     pub(crate) eliminated: Vec<(SMatrix<f64, B, B>, SVector<f64, B>)>,
     /// Couplings: of an eliminated with a kept unknown, sorted by the former.
-    pub(crate) couplings: Vec<(usize, usize, SMatrix<f64, B, A>)>,
+    pub(crate) couplings: Vec<Coupling<A, B>>,
     /// Kept unknowns coupled with an earlier one: the later, the earlier, and the block in the later's
     /// rows.
     pub(crate) links: Vec<(usize, usize, SMatrix<f64, A, A>)>,
@@ -26,9 +30,9 @@ pub(crate) struct Solved<const A: usize, const B: usize> {
     pub(crate) kept: Vec<SVector<f64, A>>,
     /// The eliminated ones.
     pub(crate) eliminated: Vec<SVector<f64, B>>,
-    factor: Factor,
+    factor: Factor<A>,
     inverses: Vec<SMatrix<f64, B, B>>,
-    couplings: Vec<(usize, usize, SMatrix<f64, B, A>)>,
+    couplings: Vec<Coupling<A, B>>,
 }
 
 impl<const A: usize, const B: usize> Arrow<A, B> {
@@ -40,30 +44,9 @@ impl<const A: usize, const B: usize> Arrow<A, B> {
             .iter()
             .map(|(block, _)| inverse(block))
             .collect::<Option<_>>()?;
-        let mut matrix = Envelope::zeros(self.first_columns());
-        let mut right: Vec<f64> = Vec::with_capacity(A * self.kept.len());
-        for (i, (block, side)) in self.kept.iter().enumerate() {
-            add_block(&mut matrix, i, i, block);
-            right.extend(side.iter());
-        }
-        for (later, earlier, block) in &self.links {
-            add_block(&mut matrix, *later, *earlier, block);
-        }
-        for group in by_eliminated(&self.couplings) {
-            let j = group[0].0;
-            for (_, a, by_a) in group {
-                let left = by_a.transpose() * inverses[j];
-                let share = left * self.eliminated[j].1;
-                for r in 0..A {
-                    right[A * a + r] -= share[r];
-                }
-                for (_, b, by_b) in group.iter().filter(|(_, b, _)| b <= a) {
-                    add_block(&mut matrix, *a, *b, &-(left * by_b));
-                }
-            }
-        }
+        let (matrix, right) = self.reduced(&inverses);
         let factor = matrix.cholesky()?;
-        let solution = factor.solve(right);
+        let solution = factor.solve(&right)?;
         let kept: Vec<SVector<f64, A>> = solution
             .chunks_exact(A)
             .map(SVector::from_column_slice)
@@ -85,20 +68,113 @@ impl<const A: usize, const B: usize> Arrow<A, B> {
         })
     }
 
-    /// The first column of every row of the reduced system: that of the first block it is coupled
-    /// with through an eliminated unknown.
-    fn first_columns(&self) -> Vec<usize> {
-        let mut first: Vec<usize> = (0..self.kept.len()).collect();
-        for group in by_eliminated(&self.couplings) {
-            let lowest = group.iter().map(|(_, a, _)| *a).min().unwrap_or(0);
-            for (_, a, _) in group {
-                first[*a] = first[*a].min(lowest);
+    /// The matrix of the Schur complement and its right-hand side.
+    fn reduced(&self, inverses: &[SMatrix<f64, B, B>]) -> (BlockMatrix<A>, Vec<f64>) {
+        let rows = Rows::new(self);
+        let n = self.kept.len();
+        let mut matrix = BlockMatrix {
+            diagonal: self.kept.iter().map(|(block, _)| *block).collect(),
+            first: vec![0],
+            columns: Vec::new(),
+            blocks: Vec::new(),
+        };
+        let mut right: Vec<f64> = Vec::with_capacity(A * n);
+        // Of each column the block that was last made in it.
+        let mut newest: Vec<Option<usize>> = vec![None; n];
+        for (a, (_, side)) in self.kept.iter().enumerate() {
+            let mut side = *side;
+            let start = matrix.columns.len();
+            for b in rows.columns(self, a) {
+                if newest[b].is_none_or(|at| at < start) {
+                    newest[b] = Some(matrix.columns.len());
+                    matrix.columns.push(b);
+                }
             }
+            matrix.columns[start..].sort_unstable();
+            for (at, &b) in matrix.columns.iter().enumerate().skip(start) {
+                newest[b] = Some(at);
+            }
+            matrix.blocks.resize(matrix.columns.len(), SMatrix::zeros());
+            matrix.first.push(matrix.columns.len());
+            for link in &rows.links[a] {
+                let (_, earlier, block) = &self.links[*link];
+                if let Some(at) = newest[*earlier] {
+                    matrix.blocks[at] += block;
+                }
+            }
+            for (group, by_a) in rows.groups(self, a) {
+                let j = group[0].0;
+                let left = by_a.transpose() * inverses[j];
+                side -= left * self.eliminated[j].1;
+                for (_, b, by_b) in group {
+                    if *b == a {
+                        matrix.diagonal[a] -= left * by_b;
+                    } else if let (true, Some(at)) = (*b < a, newest[*b]) {
+                        matrix.blocks[at] -= left * by_b;
+                    }
+                }
+            }
+            right.extend(side.iter());
         }
-        for (later, earlier, _) in &self.links {
-            first[*later] = first[*later].min(*earlier);
+        (matrix, right)
+    }
+}
+
+/// What is coupled with each kept unknown.
+struct Rows {
+    /// Where the couplings of each eliminated unknown begin and end, by coupling.
+    groups: Vec<(usize, usize)>,
+    /// The couplings of each kept unknown, in their order.
+    couplings: Vec<Vec<usize>>,
+    /// Its links with earlier ones.
+    links: Vec<Vec<usize>>,
+}
+
+impl Rows {
+    fn new<const A: usize, const B: usize>(arrow: &Arrow<A, B>) -> Self {
+        let n = arrow.kept.len();
+        let mut rows = Self {
+            groups: Vec::with_capacity(arrow.couplings.len()),
+            couplings: vec![Vec::new(); n],
+            links: vec![Vec::new(); n],
+        };
+        for group in by_eliminated(&arrow.couplings) {
+            let start = rows.groups.len();
+            let end = start + group.len();
+            rows.groups.resize(end, (start, end));
         }
-        first.iter().flat_map(|f| [A * f; A]).collect()
+        for (i, (_, a, _)) in arrow.couplings.iter().enumerate() {
+            rows.couplings[*a].push(i);
+        }
+        for (i, (later, _, _)) in arrow.links.iter().enumerate() {
+            rows.links[*later].push(i);
+        }
+        rows
+    }
+
+    /// The eliminated unknowns that a kept one is coupled with, each by all its couplings.
+    fn groups<'a, const A: usize, const B: usize>(
+        &'a self,
+        arrow: &'a Arrow<A, B>,
+        a: usize,
+    ) -> impl Iterator<Item = (&'a [Coupling<A, B>], &'a SMatrix<f64, B, A>)> {
+        self.couplings[a].iter().map(|&i| {
+            let (start, end) = self.groups[i];
+            (&arrow.couplings[start..end], &arrow.couplings[i].2)
+        })
+    }
+
+    /// The kept unknowns before one that it is coupled with, some of them several times.
+    fn columns<'a, const A: usize, const B: usize>(
+        &'a self,
+        arrow: &'a Arrow<A, B>,
+        a: usize,
+    ) -> impl Iterator<Item = usize> {
+        let links = self.links[a].iter().map(|&i| arrow.links[i].1);
+        let through = self.groups(arrow, a).flat_map(|(group, _)| group);
+        links
+            .chain(through.map(|(_, b, _)| *b))
+            .filter(move |b| *b < a)
     }
 }
 
@@ -106,39 +182,22 @@ impl<const A: usize, const B: usize> Solved<A, B> {
     /// The diagonal blocks of the system's inverse: marginal covariances of the kept and of the
     /// eliminated unknowns.
     pub(crate) fn covariances(&self) -> (Vec<SMatrix<f64, A, A>>, Vec<SMatrix<f64, B, B>>) {
-        let inverse = self.factor.selected_inverse();
-        let block = |a: usize, b: usize| {
-            SMatrix::<f64, A, A>::from_fn(|r, c| inverse.at(A * a + r, A * b + c))
-        };
-        let kept = (0..self.kept.len()).map(|a| block(a, a)).collect();
+        let inverse = SelectedInverse::new(&self.factor);
+        let kept = (0..self.kept.len()).map(|a| inverse.block(a, a)).collect();
         let mut eliminated = self.inverses.clone();
         for group in by_eliminated(&self.couplings) {
             let j = group[0].0;
             let mut middle = SMatrix::<f64, B, B>::zeros();
-            for (_, a, by_a) in group {
-                for (_, b, by_b) in group {
-                    middle += by_a * block(*a, *b) * by_b.transpose();
+            for (i, (_, a, by_a)) in group.iter().enumerate() {
+                middle += by_a * inverse.block(*a, *a) * by_a.transpose();
+                for (_, b, by_b) in &group[..i] {
+                    let share = by_a * inverse.block(*a, *b) * by_b.transpose();
+                    middle += share + share.transpose();
                 }
             }
             eliminated[j] += self.inverses[j] * middle * self.inverses[j];
         }
         (kept, eliminated)
-    }
-}
-
-/// Adds the part of a block that lies in the lower triangle.
-fn add_block<const A: usize>(
-    matrix: &mut Envelope,
-    row: usize,
-    column: usize,
-    block: &SMatrix<f64, A, A>,
-) {
-    for r in 0..A {
-        for c in 0..A {
-            if row > column || c <= r {
-                matrix.add(A * row + r, A * column + c, block[(r, c)]);
-            }
-        }
     }
 }
 

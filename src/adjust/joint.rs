@@ -311,7 +311,7 @@ impl Normal {
         self,
         covariances: bool,
     ) -> Option<(Vec<Vector3<f64>>, Vec<Vector6<f64>>, Option<Diagonals>)> {
-        // The family with fewer unknowns is kept, as its system costs the cube of its bandwidth.
+        // The family with fewer unknowns is kept, as what is left of it has to be factored.
         if 3 * self.points.len() < 6 * self.poses.len() {
             let mut couplings: Vec<_> = self
                 .couplings

@@ -15,10 +15,11 @@
 //! exactly (`sigma_z` = 0) heights stay zero and objects have two unknowns.
 
 pub(crate) mod arrow;
-mod envelope;
 mod joint;
 mod predict;
 mod problem;
+mod selected_inverse;
+mod sparse;
 mod surface;
 
 pub use joint::{Adjustment, Conditional, Edge, Marginals, NoSolution, Noise, State, Step};

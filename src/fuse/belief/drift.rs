@@ -2,7 +2,7 @@
 //!
 //! The drift is an Ornstein-Uhlenbeck process of the way travelled, and a view's error is the drift
 //! there and an independent jitter. With the drift of every view as an unknown of its own the normal
-//! equations keep their band; without, the jitter's prior would couple all views.
+//! equations stay sparse; without, the jitter's prior would couple all views.
 
 use nalgebra::{Matrix6, SMatrix, Vector6};
 
