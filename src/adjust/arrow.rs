@@ -103,6 +103,42 @@ impl<const A: usize, const B: usize> Arrow<A, B> {
 }
 
 impl<const A: usize, const B: usize> Solved<A, B> {
+    /// The solution for other right-hand sides, of the kept and of the eliminated unknowns.
+    pub(crate) fn again(
+        &self,
+        kept: &[SVector<f64, A>],
+        eliminated: &[SVector<f64, B>],
+    ) -> (Vec<SVector<f64, A>>, Vec<SVector<f64, B>>) {
+        let mut right: Vec<f64> = kept.iter().flat_map(|k| k.iter().copied()).collect();
+        for group in by_eliminated(&self.couplings) {
+            let j = group[0].0;
+            if eliminated[j].iter().all(|x| *x == 0.0) {
+                continue;
+            }
+            let inward = self.inverses[j] * eliminated[j];
+            for (_, a, by_a) in group {
+                let share = by_a.tr_mul(&inward);
+                for r in 0..A {
+                    right[A * a + r] -= share[r];
+                }
+            }
+        }
+        let kept: Vec<SVector<f64, A>> = self
+            .factor
+            .solve(right)
+            .chunks_exact(A)
+            .map(SVector::from_column_slice)
+            .collect();
+        let mut outward = eliminated.to_vec();
+        for (j, a, by_a) in &self.couplings {
+            outward[*j] -= by_a * kept[*a];
+        }
+        for (value, inverse) in outward.iter_mut().zip(&self.inverses) {
+            *value = inverse * *value;
+        }
+        (kept, outward)
+    }
+
     /// The diagonal blocks of the system's inverse: marginal covariances of the kept and of the
     /// eliminated unknowns.
     pub(crate) fn covariances(&self) -> (Vec<SMatrix<f64, A, A>>, Vec<SMatrix<f64, B, B>>) {
@@ -214,6 +250,21 @@ mod tests {
         };
         let solved = arrow.solve().unwrap();
         let inverse = whole.try_inverse().unwrap();
+        let other = DVector::from_fn(size, |_, _| draw());
+        let kept: Vec<_> = (0..n)
+            .map(|a| other.fixed_rows::<3>(3 * a).into())
+            .collect();
+        let rest: Vec<_> = (0..m)
+            .map(|j| other.fixed_rows::<2>(3 * n + 2 * j).into())
+            .collect();
+        let (kept, rest) = solved.again(&kept, &rest);
+        let expected = &inverse * other;
+        for (a, kept) in kept.iter().enumerate() {
+            assert!((kept - expected.fixed_rows::<3>(3 * a)).amax() < 1e-12);
+        }
+        for (j, rest) in rest.iter().enumerate() {
+            assert!((rest - expected.fixed_rows::<2>(3 * n + 2 * j)).amax() < 1e-12);
+        }
         let expected = &inverse * right;
         let (kept, eliminated) = solved.covariances();
         for (a, kept) in kept.iter().enumerate() {

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::algebra::{Square4, Square6};
+use super::bias::Term;
 use super::classes::{Class, Kinds};
 use super::curve::Detectability;
 use super::data::{Look, Platform, PoseNow, looks, order, platforms};
@@ -130,6 +131,9 @@ pub(super) struct Engine<'a> {
     /// Conditional covariances of the pose errors.
     pub(super) pose_cov: Vec<Square6>,
     pub(super) looks: Vec<Look>,
+    /// What they read, biases and all; and the biases that may be. Empty until those are asked for.
+    pub(super) readings: Vec<[f64; 4]>,
+    pub(super) terms: Vec<Term>,
     /// The looks of view i are `start[i]..start[i + 1]`.
     pub(super) start: Vec<usize>,
     pub(super) singles: Vec<Singleton>,
@@ -206,6 +210,8 @@ impl<'a> Engine<'a> {
             is_settled: vec![false; n],
             pose_cov,
             looks,
+            readings: Vec::new(),
+            terms: Vec::new(),
             singles: Vec::new(),
             untrusted: Vec::new(),
             background: Vec::new(),

@@ -127,6 +127,8 @@
 //! | `merge` | stage B: objects that are one | 3.3 |
 //! | `evidence` | log-odds that each object is real | 3.5 |
 //! | `learn` | noise, clutter, density, sizes, detectability | 3.5 |
+//! | `bias` | what sensors read too much, all views alike | |
+//! | `effect` | how much less views say than as many independent ones | |
 //! | `outcome` | the whole, and what comes of it | 3.7, 3.8 |
 #![allow(
     clippy::needless_range_loop,
@@ -135,10 +137,12 @@
 
 mod algebra;
 mod associate;
+mod bias;
 mod classes;
 mod curve;
 mod data;
 mod drift;
+mod effect;
 mod engine;
 mod evidence;
 mod expect;
@@ -158,8 +162,10 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
+pub use bias::{Bias, BiasOf};
 pub use classes::Confusion;
 pub use drift::Drift;
+pub use effect::Repetition;
 pub use outcome::{Belief, BeliefEvidence, BeliefObject, Single, fuse_belief};
 
 /// How poses are corrected.
