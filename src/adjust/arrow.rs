@@ -103,6 +103,12 @@ impl<const A: usize, const B: usize> Arrow<A, B> {
 }
 
 impl<const A: usize, const B: usize> Solved<A, B> {
+    /// Logarithm of the determinant of the whole matrix.
+    pub(crate) fn ln_det(&self) -> f64 {
+        let eliminated = self.inverses.iter().map(ln_det);
+        self.factor.ln_det() - eliminated.sum::<f64>()
+    }
+
     /// The solution for other right-hand sides, of the kept and of the eliminated unknowns.
     pub(crate) fn again(
         &self,
@@ -192,6 +198,22 @@ fn inverse<const N: usize>(block: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N,
     inverse.iter().all(|x| x.is_finite()).then_some(inverse)
 }
 
+/// Logarithm of the determinant of a symmetric positive definite block.
+fn ln_det<const N: usize>(block: &SMatrix<f64, N, N>) -> f64 {
+    let mut rest = *block;
+    let mut sum = 0.0;
+    for i in 0..N {
+        sum += rest[(i, i)].ln();
+        for r in i + 1..N {
+            let share = rest[(r, i)] / rest[(i, i)];
+            for c in i + 1..N {
+                rest[(r, c)] -= share * rest[(i, c)];
+            }
+        }
+    }
+    sum
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -250,6 +272,7 @@ mod tests {
         };
         let solved = arrow.solve().unwrap();
         let inverse = whole.try_inverse().unwrap();
+        assert!((solved.ln_det() + inverse.determinant().ln()).abs() < 1e-12);
         let other = DVector::from_fn(size, |_, _| draw());
         let kept: Vec<_> = (0..n)
             .map(|a| other.fixed_rows::<3>(3 * a).into())

@@ -77,6 +77,14 @@ impl Envelope {
 }
 
 impl Factor {
+    /// Logarithm of the determinant of `S`.
+    pub(super) fn ln_det(&self) -> f64 {
+        let pivots = self.lower.rows.iter().zip(&self.scale);
+        pivots
+            .filter_map(|(row, scale)| Some(2.0 * (row.last()? / scale).ln()))
+            .sum()
+    }
+
     /// The solution of `S x = b`.
     pub(super) fn solve(&self, mut b: Vec<f64>) -> Vec<f64> {
         let n = self.lower.len();

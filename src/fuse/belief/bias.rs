@@ -1,5 +1,5 @@
-//! Errors that all readings of a sensor share: a bearing counted from a little beside the bow, ranges
-//! too long, a picture's axis off the mount. No number of views averages them out, and where poses
+//! Errors that all readings of a sensor share: bearings counted from a little beside the bow,
+//! ranges too long. No number of views averages them out, and where poses
 //! are free they bend the whole map.
 //!
 //! A bias is an unknown that borders the normal equations: `[[H, G], [G^T, C]] [x; b] = [h; r]`, H of
@@ -13,14 +13,13 @@ use serde::Serialize;
 
 use super::algebra::{self, Square4};
 use super::engine::Engine;
-use super::looks::Repeats;
 use super::solve::{Part, Robust, Row, System};
 use crate::adjust::Problem;
 
 /// Sensors with fewer readings say nothing of their bias.
 const LEAST_READINGS: usize = 30;
 /// A bias is taken in where it makes the data more probable by this factor, in logarithms.
-const LEAST_GAIN: f64 = 3.0;
+const LEAST_GAIN: f64 = 1.0;
 /// And is done where it moves by less than this share of its standard deviation.
 const STILL: f64 = 0.05;
 
@@ -28,10 +27,6 @@ const STILL: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BiasOf {
-    /// Columns of pixels.
-    Column,
-    /// Rows of pixels.
-    Row,
     /// Bearings, radians.
     Bearing,
     /// Ranges, metres.
@@ -49,7 +44,7 @@ pub struct Bias {
     pub camera: Option<String>,
     /// Which of its readings.
     pub of: BiasOf,
-    /// By how much: pixels, radians, metres, or a share.
+    /// By how much: radians, metres, or a share.
     pub value: f64,
     /// One standard deviation of that.
     pub sigma: f64,
@@ -223,8 +218,9 @@ impl Engine<'_> {
                 let sigma = (variance / n).sqrt();
                 match row {
                     0 if is_bearing[sensor] => add(BiasOf::Bearing, sigma),
-                    0 => add(BiasOf::Column, sigma),
-                    1 => add(BiasOf::Row, sigma),
+                    // A picture's axis off its mount is as a heading that is off, and the few
+                    // headings of a short traverse that drift would pass for it.
+                    0 | 1 => (),
                     _ => {
                         add(BiasOf::Range, sigma);
                         add(BiasOf::RangeScale, sigma / (range_m / n).max(0.1));
@@ -237,25 +233,7 @@ impl Engine<'_> {
 
     /// The normal equations of all objects and poses, bordered by the biases that may be.
     pub(super) fn survey(&mut self) -> Option<Survey> {
-        let edges = std::mem::take(&mut self.edges);
-        let mut objects = std::mem::take(&mut self.objects);
-        let of: Vec<(usize, usize)> = edges
-            .iter()
-            .map(|e| (e.object, self.looks[e.look].view))
-            .collect();
-        let worth = self.worth(&objects, &of, Repeats::Errors);
-        let moving: Vec<usize> = (0..self.n_views()).collect();
-        let part = Part {
-            objects: &mut objects,
-            edges: &edges,
-            worth: &worth,
-            moving: &moving,
-            folded: None,
-        };
-        let survey = self.bordered(&part);
-        self.edges = edges;
-        self.objects = objects;
-        survey
+        self.whole(Self::bordered)
     }
 
     fn bordered(&self, part: &Part<'_>) -> Option<Survey> {

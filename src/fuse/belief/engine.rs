@@ -8,6 +8,7 @@ use super::bias::Term;
 use super::classes::{Class, Kinds};
 use super::curve::Detectability;
 use super::data::{Look, Platform, PoseNow, looks, order, platforms};
+use super::drift::Drift;
 use super::expect::{Expected, expect};
 use super::ground::SmoothGround;
 use super::noise::{Scales, ln_add, variances};
@@ -72,6 +73,8 @@ pub(super) struct Model {
     pub(super) scales: Scales,
     /// Factors on those of pose errors.
     pub(super) pose_scale: [f64; 6],
+    /// How pose errors drift, where they do.
+    pub(super) drift: Option<Drift>,
     /// Variance of the height of objects above the terrain, m^2.
     pub(super) height_variance: f64,
     /// Logarithms of sizes of objects, metres.
@@ -180,6 +183,10 @@ impl<'a> Engine<'a> {
         let model = Model {
             scales: [1.0; 4],
             pose_scale: [1.0; 6],
+            drift: match settings.pose_correction {
+                PoseCorrection::Drift => Some(settings.drift),
+                _ => None,
+            },
             height_variance: problem.height_sigma_m.max(2e-3).powi(2),
             size: Normal {
                 mean: 0.0,

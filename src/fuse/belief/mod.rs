@@ -124,6 +124,7 @@
 //! | `sequence` | stage A: view after view, over a window that still moves | 3.6 |
 //! | `associate` | stage B: memberships, births, deaths | 3.2, 3.3 |
 //! | `solve` | stage B: one Gauss-Newton step of places and poses, and covariances | 3.4 |
+//! | `drift`, `chain` | stage B: errors of poses that drift, stated or found | 3.4 |
 //! | `merge` | stage B: objects that are one | 3.3 |
 //! | `evidence` | log-odds that each object is real | 3.5 |
 //! | `learn` | noise, clutter, density, sizes, detectability | 3.5 |
@@ -138,6 +139,7 @@
 mod algebra;
 mod associate;
 mod bias;
+mod chain;
 mod classes;
 mod curve;
 mod data;

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::BeliefSettings;
 use super::algebra::{Square4, Square6, to_matrix6};
 use super::bias::{Bias, Term};
+use super::drift::Drift;
 use super::effect::Repetition;
 use super::engine::Engine;
 use super::evidence::{Evidence, probability};
@@ -24,6 +25,8 @@ const LEAST_ROUNDS: usize = 3;
 const STILL_M: f64 = 1e-3;
 /// Registration is tried again where more than this share of the detections changed company.
 const DOUBT: f64 = 0.015;
+/// Rounds of association and learning after errors of poses were found to drift.
+const DRIFT_ROUNDS: usize = 3;
 /// Steps at most that look for biases.
 const BIAS_STEPS: usize = 4;
 /// Squared scales of the robust steps between registration and association.
@@ -111,6 +114,8 @@ pub struct BeliefEvidence {
     pub biases: Vec<Bias>,
     /// How the errors of consecutive views repeat themselves.
     pub repetition: Repetition,
+    /// How pose errors drift, stated or found.
+    pub drift: Option<Drift>,
 }
 
 /// Covariances of objects and of poses, everything else free.
@@ -243,6 +248,15 @@ impl Engine<'_> {
         let Some(mut marginal) = self.settled() else {
             return (None, Shared::default());
         };
+        if self.find_drift() {
+            for _ in 0..DRIFT_ROUNDS {
+                let evidence = self.round();
+                self.learn(&evidence);
+            }
+            if let Some(settled) = self.settled() {
+                marginal = settled;
+            }
+        }
         self.readings = self.looks.iter().map(|l| l.values).collect();
         self.terms = self.terms();
         let none = (Vec::new(), DMatrix::zeros(0, 0));
@@ -417,6 +431,7 @@ impl Engine<'_> {
                 detectability: m.curve.values().to_vec(),
                 biases: self.biases(problem, &shared.biases),
                 repetition: shared.repetition,
+                drift: m.drift,
             },
         }
     }

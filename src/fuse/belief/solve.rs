@@ -7,6 +7,7 @@ use super::algebra::{
     self, ByPose, Factor4, Square4, Square6, add_information, from_matrix, inverse4, inverse6,
     to_matrix4,
 };
+use super::chain::Bordered;
 use super::engine::{Edge, Engine};
 use super::looks::Repeats;
 use super::noise::{robust_weight, with_noise};
@@ -369,6 +370,29 @@ impl Engine<'_> {
         }
     }
 
+    /// What `of` makes of all objects, edges and views at this moment.
+    pub(super) fn whole<T>(&mut self, of: impl FnOnce(&Self, &Part<'_>) -> T) -> T {
+        let edges = std::mem::take(&mut self.edges);
+        let mut objects = std::mem::take(&mut self.objects);
+        let views: Vec<(usize, usize)> = edges
+            .iter()
+            .map(|e| (e.object, self.looks[e.look].view))
+            .collect();
+        let worth = self.worth(&objects, &views, Repeats::Errors);
+        let moving: Vec<usize> = (0..self.n_views()).collect();
+        let part = Part {
+            objects: &mut objects,
+            edges: &edges,
+            worth: &worth,
+            moving: &moving,
+            folded: None,
+        };
+        let made = of(self, &part);
+        self.edges = edges;
+        self.objects = objects;
+        made
+    }
+
     /// Gauss-Newton steps of all objects and poses; with marginal covariances of the last if asked.
     pub(super) fn adjust(
         &mut self,
@@ -416,7 +440,7 @@ pub(super) struct Normal {
     pub(super) pull: Vec<[f64; 4]>,
     /// How near the nearest view of each object is, metres.
     nearest_m: Vec<f64>,
-    poses: Vec<PoseBlock>,
+    pub(super) poses: Vec<PoseBlock>,
     couplings: Vec<Coupling>,
     /// Couplings between poses, where they drift.
     links: Vec<(usize, usize, SMatrix<f64, 6, 6>)>,
@@ -495,15 +519,17 @@ fn inverse_or_zero(a: &Square4) -> Square4 {
     inverse4(a).map_or([[0.0; 4]; 4], |(inverse, _)| inverse)
 }
 
-type ObjectBlock = (SMatrix<f64, 4, 4>, Vector4<f64>);
-type PoseBlock = (SMatrix<f64, 6, 6>, Vector6<f64>);
-type Coupling = (usize, usize, SMatrix<f64, 4, 6>);
-type Steps = (Vec<Vector4<f64>>, Vec<Vector6<f64>>);
+pub(super) type ObjectBlock = (SMatrix<f64, 4, 4>, Vector4<f64>);
+pub(super) type PoseBlock = (SMatrix<f64, 6, 6>, Vector6<f64>);
+pub(super) type Coupling = (usize, usize, SMatrix<f64, 4, 6>);
+pub(super) type Steps = (Vec<Vector4<f64>>, Vec<Vector6<f64>>);
 
 /// Solved normal equations, with whichever family of unknowns makes the smaller system kept.
 pub(super) enum System {
     PosesKept(Solved<6, 4>),
     ObjectsKept(Solved<4, 6>),
+    /// Poses that drift are a chain, which few objects border.
+    Bordered(Box<Bordered>),
 }
 
 impl System {
@@ -522,6 +548,13 @@ impl System {
             spacing,
             ..
         } = normal;
+        if spacing == 2 && super::drift::few(poses.len() / 2, objects.len()) {
+            let bordered = Bordered::new(&objects, &poses, links, &couplings)?;
+            let sides: Vec<Vector4<f64>> = objects.iter().map(|o| o.1).collect();
+            let pulls: Vec<Vector6<f64>> = poses.iter().map(|p| p.1).collect();
+            let (steps, turns) = bordered.solve(&sides, &pulls);
+            return Some((Self::Bordered(Box::new(bordered)), steps, turns));
+        }
         if spacing == 1 && 4 * objects.len() < 6 * poses.len() {
             let mut solved = objects_kept(objects, poses, &couplings)?;
             let steps = solved.kept.clone();
@@ -542,6 +575,16 @@ impl System {
                 (objects, poses)
             }
             Self::ObjectsKept(solved) => solved.again(objects, poses),
+            Self::Bordered(bordered) => bordered.solve(objects, poses),
+        }
+    }
+
+    /// Logarithm of the determinant of the normal equations.
+    pub(super) fn ln_det(&self) -> f64 {
+        match self {
+            Self::PosesKept(solved) => solved.ln_det(),
+            Self::ObjectsKept(solved) => solved.ln_det(),
+            Self::Bordered(bordered) => bordered.ln_det,
         }
     }
 
@@ -553,6 +596,7 @@ impl System {
                 (objects, poses)
             }
             Self::ObjectsKept(solved) => solved.covariances(),
+            Self::Bordered(bordered) => bordered.covariances(),
         }
     }
 }
