@@ -292,7 +292,7 @@ impl Engine<'_> {
             }
         });
         pulls.sort_by_key(|p| p.0);
-        let (system, steps, turns) = System::new(normal)?;
+        let (system, (steps, turns)) = System::new(normal)?;
         let outward: Vec<Sides> = border.iter().map(|(o, p)| system.again(o, p)).collect();
         for i in 0..b {
             pull[i] -= along(&border[i].0, &steps) + along(&border[i].1, &turns);

@@ -21,7 +21,9 @@ const MOST_VIEWS: usize = 3000;
 const LEAST_GAIN: f64 = 5.0;
 /// What is tried: shares, and lengths as parts of the whole way.
 const SHARES: [f64; 3] = [0.8, 0.5, 0.95];
-const PARTS: [f64; 2] = [0.125, 0.5];
+const PARTS: [f64; 2] = [0.5, 0.125];
+/// One so much less probable than independent errors need not be followed by others.
+const HOPELESS: f64 = 20.0;
 
 /// How a run's pose errors drift.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -76,10 +78,10 @@ impl Engine<'_> {
         let mut best: Option<(f64, Drift)> = None;
         let try_one = |engine: &mut Self, best: &mut Option<(f64, Drift)>, drift: Drift| {
             engine.model.drift = Some(drift);
-            if let Some(l) = engine.ln_marginal() {
-                if best.is_none_or(|b| l > b.0) {
-                    *best = Some((l, drift));
-                }
+            if let Some(l) = engine.ln_marginal()
+                && best.is_none_or(|b| l > b.0)
+            {
+                *best = Some((l, drift));
             }
         };
         for part in PARTS {
@@ -88,6 +90,9 @@ impl Engine<'_> {
                 length_m: part * way_m,
             };
             try_one(self, &mut best, drift);
+            if best.is_none_or(|b| b.0 < least - HOPELESS) {
+                break;
+            }
         }
         let is_found =
             |best: &Option<(f64, Drift)>| best.filter(|b| b.0 > least + LEAST_GAIN).map(|b| b.1);
@@ -134,7 +139,7 @@ impl Engine<'_> {
         }
         let pulls = normal.pull.clone();
         let turns: Vec<Vector6<f64>> = normal.poses.iter().map(|p| p.1).collect();
-        let (system, steps, turned) = super::solve::System::new(normal)?;
+        let (system, (steps, turned)) = super::solve::System::new(normal)?;
         let gain = pulls.iter().zip(&steps);
         let gain = gain.map(|(p, s)| p.iter().zip(s).map(|(p, s)| p * s).sum::<f64>());
         let turning = turns.iter().zip(&turned).map(|(p, t)| p.dot(t));

@@ -172,3 +172,56 @@ fn sign(n: usize) -> f64 {
     let mixed = (mixed ^ (mixed >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     if (mixed >> 40) & 1 == 0 { 1.0 } else { -1.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fading(r: f64, n: i32) -> Vec<f64> {
+        (0..n).map(|lag| 2.0 * r.powi(lag)).collect()
+    }
+
+    /// A first-order autoregressive process has (1 + r) / (1 - r).
+    #[test]
+    fn autoregressive_errors_have_their_known_effect() {
+        for (r, effect) in [(0.5, 3.0), (0.8, 9.0)] {
+            let found = Repetition::new(&fading(r, 1000), 1_000_000);
+            let off = (found.design_effect / effect - 1.0).abs();
+            assert!(off < 0.01, "{r}: {}", found.design_effect);
+            assert!((found.correlations[0] - r).abs() < 1e-12);
+            assert!((found.correlations[2] - r.powi(4)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn few_views_say_white() {
+        let of = |n_views| Repetition::new(&fading(0.5, 16), n_views).design_effect;
+        assert!(of(4) < 1.45 && of(40) < of(400) && of(400) < 3.0);
+    }
+
+    #[test]
+    fn what_alternates_does_not_narrow() {
+        let none = Repetition::default();
+        assert_eq!(
+            Repetition::new(&[2.0, 0.0, 0.0, 0.0], 100).design_effect,
+            1.0
+        );
+        assert_eq!(Repetition::new(&fading(-0.5, 64), 100).design_effect, 1.0);
+        assert_eq!(Repetition::new(&[], 100), none);
+        assert_eq!(Repetition::new(&[0.0], 100), none);
+    }
+
+    /// The mean of n values of such a process: for two, 1 + r.
+    #[test]
+    fn one_look_repeats_nothing() {
+        let repetition = Repetition {
+            design_effect: 3.0,
+            window: 8,
+            correlations: Vec::new(),
+        };
+        assert!((repetition.of(1.0) - 1.0).abs() < 1e-12);
+        assert!((repetition.of(2.0) - 1.5).abs() < 1e-12);
+        assert!((repetition.of(1e9) - 3.0).abs() < 1e-6);
+        assert!((Repetition::default().of(7.0) - 1.0).abs() < 1e-12);
+    }
+}

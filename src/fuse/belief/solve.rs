@@ -241,7 +241,7 @@ impl Engine<'_> {
         marginals: bool,
     ) -> (Vec<[f64; 4]>, Option<(Vec<Square4>, Vec<Square6>)>) {
         let (n_objects, spacing) = (normal.information.len(), normal.spacing);
-        let Some((system, steps, turns)) = System::new(normal) else {
+        let Some((system, (steps, turns))) = System::new(normal) else {
             return (vec![[0.0; 4]; n_objects], None);
         };
         let marginal = marginals.then(|| {
@@ -534,7 +534,7 @@ pub(super) enum System {
 
 impl System {
     /// The system, and the steps of objects and poses; `None` where it is not positive definite.
-    pub(super) fn new(normal: Normal) -> Option<(Self, Vec<Vector4<f64>>, Vec<Vector6<f64>>)> {
+    pub(super) fn new(normal: Normal) -> Option<(Self, Steps)> {
         let objects: Vec<ObjectBlock> = normal
             .information
             .iter()
@@ -552,19 +552,19 @@ impl System {
             let bordered = Bordered::new(&objects, &poses, links, &couplings)?;
             let sides: Vec<Vector4<f64>> = objects.iter().map(|o| o.1).collect();
             let pulls: Vec<Vector6<f64>> = poses.iter().map(|p| p.1).collect();
-            let (steps, turns) = bordered.solve(&sides, &pulls);
-            return Some((Self::Bordered(Box::new(bordered)), steps, turns));
+            let both = bordered.solve(&sides, &pulls);
+            return Some((Self::Bordered(Box::new(bordered)), both));
         }
         if spacing == 1 && 4 * objects.len() < 6 * poses.len() {
             let mut solved = objects_kept(objects, poses, &couplings)?;
             let steps = solved.kept.clone();
             let turns = std::mem::take(&mut solved.eliminated);
-            return Some((Self::ObjectsKept(solved), steps, turns));
+            return Some((Self::ObjectsKept(solved), (steps, turns)));
         }
         let mut solved = poses_kept(objects, poses, links, &couplings)?;
         let turns = solved.kept.clone();
         let steps = std::mem::take(&mut solved.eliminated);
-        Some((Self::PosesKept(solved), steps, turns))
+        Some((Self::PosesKept(solved), (steps, turns)))
     }
 
     /// The solution for other right-hand sides, of objects and of poses.
