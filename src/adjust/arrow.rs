@@ -46,7 +46,7 @@ impl<const A: usize, const B: usize> Arrow<A, B> {
             .collect::<Option<_>>()?;
         let (matrix, right) = self.reduced(&inverses);
         let factor = matrix.cholesky()?;
-        let solution = factor.solve(&right)?;
+        let solution = factor.solve(&right);
         let kept: Vec<SVector<f64, A>> = solution
             .chunks_exact(A)
             .map(SVector::from_column_slice)
@@ -179,6 +179,48 @@ impl Rows {
 }
 
 impl<const A: usize, const B: usize> Solved<A, B> {
+    /// Logarithm of the determinant of the whole matrix.
+    pub(crate) fn ln_det(&self) -> f64 {
+        let eliminated = self.inverses.iter().map(ln_det);
+        self.factor.ln_det() - eliminated.sum::<f64>()
+    }
+
+    /// The solution for other right-hand sides, of the kept and of the eliminated unknowns.
+    pub(crate) fn again(
+        &self,
+        kept: &[SVector<f64, A>],
+        eliminated: &[SVector<f64, B>],
+    ) -> (Vec<SVector<f64, A>>, Vec<SVector<f64, B>>) {
+        let mut right: Vec<f64> = kept.iter().flat_map(|k| k.iter().copied()).collect();
+        for group in by_eliminated(&self.couplings) {
+            let j = group[0].0;
+            if eliminated[j].iter().all(|x| *x == 0.0) {
+                continue;
+            }
+            let inward = self.inverses[j] * eliminated[j];
+            for (_, a, by_a) in group {
+                let share = by_a.tr_mul(&inward);
+                for r in 0..A {
+                    right[A * a + r] -= share[r];
+                }
+            }
+        }
+        let kept: Vec<SVector<f64, A>> = self
+            .factor
+            .solve(&right)
+            .chunks_exact(A)
+            .map(SVector::from_column_slice)
+            .collect();
+        let mut outward = eliminated.to_vec();
+        for (j, a, by_a) in &self.couplings {
+            outward[*j] -= by_a * kept[*a];
+        }
+        for (value, inverse) in outward.iter_mut().zip(&self.inverses) {
+            *value = inverse * *value;
+        }
+        (kept, outward)
+    }
+
     /// The diagonal blocks of the system's inverse: marginal covariances of the kept and of the
     /// eliminated unknowns.
     pub(crate) fn covariances(&self) -> (Vec<SMatrix<f64, A, A>>, Vec<SMatrix<f64, B, B>>) {
@@ -213,6 +255,22 @@ fn inverse<const N: usize>(block: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N,
     let inverse = scaled.try_inverse()?;
     let inverse = SMatrix::<f64, N, N>::from_fn(|r, c| inverse[(r, c)] * scale[r] * scale[c]);
     inverse.iter().all(|x| x.is_finite()).then_some(inverse)
+}
+
+/// Logarithm of the determinant of a symmetric positive definite block.
+fn ln_det<const N: usize>(block: &SMatrix<f64, N, N>) -> f64 {
+    let mut rest = *block;
+    let mut sum = 0.0;
+    for i in 0..N {
+        sum += rest[(i, i)].ln();
+        for r in i + 1..N {
+            let share = rest[(r, i)] / rest[(i, i)];
+            for c in i + 1..N {
+                rest[(r, c)] -= share * rest[(i, c)];
+            }
+        }
+    }
+    sum
 }
 
 #[cfg(test)]
@@ -273,6 +331,22 @@ mod tests {
         };
         let solved = arrow.solve().unwrap();
         let inverse = whole.try_inverse().unwrap();
+        assert!((solved.ln_det() + inverse.determinant().ln()).abs() < 1e-12);
+        let other = DVector::from_fn(size, |_, _| draw());
+        let kept: Vec<_> = (0..n)
+            .map(|a| other.fixed_rows::<3>(3 * a).into())
+            .collect();
+        let rest: Vec<_> = (0..m)
+            .map(|j| other.fixed_rows::<2>(3 * n + 2 * j).into())
+            .collect();
+        let (kept, rest) = solved.again(&kept, &rest);
+        let expected = &inverse * other;
+        for (a, kept) in kept.iter().enumerate() {
+            assert!((kept - expected.fixed_rows::<3>(3 * a)).amax() < 1e-12);
+        }
+        for (j, rest) in rest.iter().enumerate() {
+            assert!((rest - expected.fixed_rows::<2>(3 * n + 2 * j)).amax() < 1e-12);
+        }
         let expected = &inverse * right;
         let (kept, eliminated) = solved.covariances();
         for (a, kept) in kept.iter().enumerate() {

@@ -265,10 +265,10 @@ impl<const A: usize> Factor<A> {
         }
     }
 
-    /// The solution of `S x = b`; `None` where there is no memory for it.
-    pub(super) fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
+    /// The solution of `S x = b`.
+    pub(super) fn solve(&self, b: &[f64]) -> Vec<f64> {
         let Some(nodes) = self.supernodes() else {
-            return Some(b.to_vec());
+            return b.to_vec();
         };
         let at = |i: usize| A * self.place[i / A] + i % A;
         let mut x = Mat::<f64>::zeros(b.len(), 1);
@@ -276,11 +276,27 @@ impl<const A: usize> Factor<A> {
             x[(at(i), 0)] = b * self.scale[at(i)];
         }
         let scratch = nodes.symbolic().solve_in_place_scratch::<f64>(1, Par::Seq);
-        let mut memory = memory(scratch)?;
+        let mut memory = MemBuffer::new(scratch);
         let stack = MemStack::new(&mut memory);
         nodes.solve_in_place_with_conj(Conj::No, x.as_mut(), Par::Seq, stack);
-        let unscaled = (0..b.len()).map(|i| x[(at(i), 0)] * self.scale[at(i)]);
-        Some(unscaled.collect())
+        (0..b.len())
+            .map(|i| x[(at(i), 0)] * self.scale[at(i)])
+            .collect()
+    }
+
+    /// Logarithm of the determinant of `S`.
+    pub(super) fn ln_det(&self) -> f64 {
+        let scales = self.scale.iter().map(|s| s.ln()).sum::<f64>();
+        let pivots = self.supernodes().map_or(0.0, |nodes| {
+            let of_node = |s: usize| {
+                let node = nodes.supernode(s).val();
+                (0..node.ncols()).map(|c| node[(c, c)].ln()).sum::<f64>()
+            };
+            (0..nodes.symbolic().n_supernodes())
+                .map(of_node)
+                .sum::<f64>()
+        });
+        2.0 * (pivots - scales)
     }
 }
 
@@ -343,9 +359,12 @@ mod tests {
         let expected = dense.clone().try_inverse().unwrap();
         let factor = sparse.clone().cholesky().unwrap();
         let b = DVector::from_fn(A * n, |i, _| f64::from(u32::try_from(i).unwrap()).sin());
-        let x = DVector::from_vec(factor.solve(b.as_slice()).unwrap());
+        let x = DVector::from_vec(factor.solve(b.as_slice()));
         let residual = &dense * x - &b;
         assert!(residual.amax() < 1e-10, "{}", residual.amax());
+        let pivots = dense.clone().cholesky().unwrap().l().diagonal();
+        let ln_det: f64 = pivots.iter().map(|p| 2.0 * p.ln()).sum();
+        assert!((factor.ln_det() - ln_det).abs() < 1e-9 * ln_det.abs().max(1.0));
         let inverse = SelectedInverse::new(&factor);
         let close = |row: usize, column: usize| {
             let block = inverse.block(row, column);
@@ -407,7 +426,7 @@ mod tests {
     fn nothing_unknown_is_solved() {
         let (sparse, _) = matrix::<6>(0, |_, _| true);
         let factor = sparse.cholesky().unwrap();
-        assert!(factor.solve(&[]).unwrap().is_empty());
+        assert!(factor.solve(&[]).is_empty());
         SelectedInverse::new(&factor);
     }
 
@@ -438,7 +457,7 @@ mod tests {
             let _between = vec![0u8; 8 * odd];
             let factor = sparse.cholesky().unwrap();
             let b: Vec<f64> = (0..6 * 70).map(|i| f64::from(i).cos()).collect();
-            let x = factor.solve(&b).unwrap();
+            let x = factor.solve(&b);
             let inverse = SelectedInverse::new(&factor);
             let blocks = (0..70).flat_map(|i| inverse.block(i, i).data.0.concat());
             let bits: Vec<u64> = x.into_iter().chain(blocks).map(f64::to_bits).collect();

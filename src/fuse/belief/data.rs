@@ -40,6 +40,8 @@ pub(super) struct Platform {
     pub(super) sector: (f64, f64),
     /// Whether its bearings count from true north.
     pub(super) is_azimuth: bool,
+    /// The number of its sensor, whose views share biases.
+    pub(super) sensor: usize,
 }
 
 /// Which numbers a detection reads, in the order of the four rows: column or bearing, row, logarithm
@@ -88,7 +90,8 @@ pub(super) fn order(views: &[View]) -> Vec<usize> {
 pub(super) fn platforms(problem: &Problem<'_>, order: &[usize], fov: f64) -> Vec<Platform> {
     let times: Vec<Option<f64>> = times(problem.views);
     let by_azimuth = azimuth_views(problem);
-    let place = |&index: &usize| {
+    let sensors = super::bias::sensors(problem, order);
+    let place = |(&index, sensor): (&usize, usize)| {
         let view = &problem.views[index];
         let mount = view
             .body_from_camera()
@@ -111,9 +114,10 @@ pub(super) fn platforms(problem: &Problem<'_>, order: &[usize], fov: f64) -> Vec
                 (-0.5 * fov, 0.5 * fov)
             },
             is_azimuth: by_azimuth[index],
+            sensor,
         }
     };
-    order.iter().map(place).collect()
+    order.iter().zip(sensors).map(place).collect()
 }
 
 fn is_wide(camera: &Camera) -> bool {

@@ -4,9 +4,11 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::algebra::{Square4, Square6};
+use super::bias::Term;
 use super::classes::{Class, Kinds};
 use super::curve::Detectability;
 use super::data::{Look, Platform, PoseNow, looks, order, platforms};
+use super::drift::Drift;
 use super::expect::{Expected, expect};
 use super::ground::SmoothGround;
 use super::noise::{Scales, ln_add, variances};
@@ -72,6 +74,8 @@ pub(super) struct Model {
     pub(super) scales: Scales,
     /// Factors on those of pose errors.
     pub(super) pose_scale: [f64; 6],
+    /// How pose errors drift, where they do.
+    pub(super) drift: Option<Drift>,
     /// Variance of the height of objects above the terrain, m^2.
     pub(super) height_variance: f64,
     /// Logarithms of sizes of objects, metres.
@@ -133,6 +137,9 @@ pub(super) struct Engine<'a> {
     /// Conditional covariances of the pose errors.
     pub(super) pose_cov: Vec<Square6>,
     pub(super) looks: Vec<Look>,
+    /// What they read, biases and all; and the biases that may be. Empty until those are asked for.
+    pub(super) readings: Vec<[f64; 4]>,
+    pub(super) terms: Vec<Term>,
     /// The looks of view i are `start[i]..start[i + 1]`.
     pub(super) start: Vec<usize>,
     pub(super) singles: Vec<Singleton>,
@@ -179,6 +186,10 @@ impl<'a> Engine<'a> {
         let model = Model {
             scales: [1.0; 4],
             pose_scale: [1.0; 6],
+            drift: match settings.pose_correction {
+                PoseCorrection::Drift => Some(settings.drift),
+                _ => None,
+            },
             height_variance: problem.height_sigma_m.max(2e-3).powi(2),
             size: Normal {
                 mean: 0.0,
@@ -210,6 +221,8 @@ impl<'a> Engine<'a> {
             is_settled: vec![false; n],
             pose_cov,
             looks,
+            readings: Vec::new(),
+            terms: Vec::new(),
             singles: Vec::new(),
             untrusted: Vec::new(),
             background: Vec::new(),

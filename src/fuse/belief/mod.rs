@@ -125,9 +125,12 @@
 //! | `sequence` | stage A: view after view, over a window that still moves | 3.6 |
 //! | `associate` | stage B: memberships, births, deaths | 3.2, 3.3 |
 //! | `solve` | stage B: one Gauss-Newton step of places and poses, and covariances | 3.4 |
+//! | `drift`, `chain` | stage B: errors of poses that drift, stated or found | 3.4 |
 //! | `merge` | stage B: objects that are one | 3.3 |
 //! | `evidence` | log-odds that each object is real | 3.5 |
 //! | `learn` | noise, clutter, density, sizes, detectability | 3.5 |
+//! | `bias` | what sensors read too much, all views alike | |
+//! | `effect` | how much less views say than as many independent ones | |
 //! | `outcome` | the whole, and what comes of it | 3.7, 3.8 |
 #![allow(
     clippy::needless_range_loop,
@@ -136,10 +139,13 @@
 
 mod algebra;
 mod associate;
+mod bias;
+mod chain;
 mod classes;
 mod curve;
 mod data;
 mod drift;
+mod effect;
 mod engine;
 mod evidence;
 mod expect;
@@ -160,8 +166,10 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
+pub use bias::{Bias, BiasOf};
 pub use classes::Confusion;
 pub use drift::Drift;
+pub use effect::Repetition;
 pub use outcome::{Belief, BeliefEvidence, BeliefObject, Single, fuse_belief};
 
 /// How poses are corrected.

@@ -1,15 +1,18 @@
 //! The whole method, and what comes of it.
 
-use nalgebra::{Matrix3, Matrix6, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector6};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::BeliefSettings;
-use super::algebra::{Square4, to_matrix6};
+use super::algebra::{Square4, Square6, to_matrix6};
+use super::bias::{Bias, Term};
+use super::drift::Drift;
+use super::effect::Repetition;
 use super::engine::Engine;
 use super::evidence::{Evidence, probability};
 use super::learn::LEAST_VIEWS;
-use super::solve::{Robust, Stepped};
+use super::solve::Robust;
 use crate::adjust::Problem;
 use crate::frame::{Enu, Point};
 use crate::fuse::Member;
@@ -26,6 +29,10 @@ const STILL: f64 = 0.2;
 const WAVERING: f64 = 5e-3;
 /// Registration is tried again where more than this share of the detections changed company.
 const DOUBT: f64 = 0.015;
+/// Rounds of association and learning after errors of poses were found to drift.
+const DRIFT_ROUNDS: usize = 3;
+/// Steps at most that look for biases.
+const BIAS_STEPS: usize = 4;
 /// Squared scales of the robust steps between registration and association.
 const SCHEDULE: [f64; 7] = [400.0, 100.0, 100.0, 25.0, 25.0, 9.0, 9.0];
 
@@ -107,6 +114,23 @@ pub struct BeliefEvidence {
     pub scores: Option<[f64; 3]>,
     /// Probability of detection by apparent size or range.
     pub detectability: Vec<f64>,
+    /// What sensors read too much, where the data say so.
+    pub biases: Vec<Bias>,
+    /// How the errors of consecutive views repeat themselves.
+    pub repetition: Repetition,
+    /// How pose errors drift, stated or found.
+    pub drift: Option<Drift>,
+}
+
+/// Covariances of objects and of poses, everything else free.
+type Covariances = (Vec<Square4>, Vec<Square6>);
+
+/// Errors that views share.
+#[derive(Default)]
+struct Shared {
+    repetition: Repetition,
+    /// Biases, and a standard deviation of each.
+    biases: Vec<(Term, f64)>,
 }
 
 /// Fuses measurements of many views into one map.
@@ -262,22 +286,83 @@ impl Engine<'_> {
         (evidence, ROUNDS, false)
     }
 
-    /// The adjustment that covariances are taken of. What is learnt of the poses' noise on the way
+    /// The adjustment that covariances are taken of, and what errors views turned out to share.
+    fn last_adjustment(&mut self) -> (Option<Covariances>, Shared) {
+        let Some(mut marginal) = self.settled() else {
+            return (None, Shared::default());
+        };
+        if self.find_drift() {
+            for _ in 0..DRIFT_ROUNDS {
+                let evidence = self.round();
+                self.learn(&evidence);
+            }
+            if let Some(settled) = self.settled() {
+                marginal = settled;
+            }
+        }
+        self.readings = self.looks.iter().map(|l| l.values).collect();
+        self.terms = self.terms();
+        let none = (Vec::new(), DMatrix::zeros(0, 0));
+        let Some(mut survey) = self.survey() else {
+            return (Some(marginal), Shared::default());
+        };
+        let mut shared = Shared {
+            repetition: self.repetition(&survey, &marginal.0, &none),
+            biases: Vec::new(),
+        };
+        let mut any = false;
+        for _ in 0..BIAS_STEPS {
+            if !self.find_biases(&survey, shared.repetition.design_effect) {
+                break;
+            }
+            any = true;
+            if let Some(settled) = self.settled() {
+                marginal = settled;
+            }
+            let Some(next) = self.survey() else { break };
+            survey = next;
+            let mut wide = marginal.clone();
+            let on = self.biases_on(&survey, 1.0);
+            survey.widen(&on.0, &on.1, &mut wide);
+            shared.repetition = self.repetition(&survey, &wide.0, &on);
+        }
+        if any {
+            let (on, covariance) = self.biases_on(&survey, 1.0);
+            survey.widen(&on, &covariance, &mut marginal);
+            shared.biases = on
+                .iter()
+                .enumerate()
+                .map(|(i, &t)| {
+                    let sigma = (covariance[(i, i)] * shared.repetition.design_effect).sqrt();
+                    (self.terms[t], sigma)
+                })
+                .collect();
+        }
+        let support = self.support();
+        for (cov, looks) in marginal.0.iter_mut().zip(&support) {
+            let factor = shared.repetition.of(*looks);
+            for x in cov.iter_mut().flatten() {
+                *x *= factor;
+            }
+        }
+        (Some(marginal), shared)
+    }
+
+    /// The last steps and marginal covariances. What is learnt of the poses' noise on the way
     /// leaves out errors that views share; the covariances shall not.
-    fn last_adjustment(&mut self) -> Option<Stepped> {
-        let mut stepped = self.adjust(3, Robust::Contaminated, true);
+    fn settled(&mut self) -> Option<Covariances> {
+        let mut marginal = self.adjust(3, Robust::Contaminated, true)?.marginal;
         let learns = self.corrects_poses() && self.drift_law().is_none();
         if learns && self.n_views() >= LEAST_VIEWS {
             for _ in 0..2 {
-                let marginal = stepped.as_ref().and_then(|s| s.marginal.as_ref());
-                let Some(poses) = marginal.map(|m| m.1.clone()) else {
+                let Some(poses) = marginal.as_ref().map(|m| &m.1) else {
                     break;
                 };
-                self.learn_pose_noise(Some(&poses));
-                stepped = self.adjust(1, Robust::Contaminated, true);
+                self.learn_pose_noise(Some(poses));
+                marginal = self.adjust(1, Robust::Contaminated, true)?.marginal;
             }
         }
-        stepped
+        marginal
     }
 
     /// Logarithm of the posterior, up to a constant: every detection clutter, what each object adds
@@ -310,13 +395,11 @@ impl Engine<'_> {
     }
 
     fn outcome(&mut self, problem: &Problem<'_>, rounds: usize, converged: bool) -> Belief {
-        let stepped = self.last_adjustment();
+        let (marginal, shared) = self.last_adjustment();
         self.weigh_background();
         let evidence = self.weigh(self.expectation());
         let log_odds = evidence.final_log_odds();
-        let (cov, pose_cov) = stepped
-            .and_then(|s| s.marginal)
-            .unwrap_or_else(|| (self.object_cov.clone(), Vec::new()));
+        let (cov, pose_cov) = marginal.unwrap_or_else(|| (self.object_cov.clone(), Vec::new()));
         let mut members: Vec<Vec<Member>> = vec![Vec::new(); self.objects.len()];
         for edge in &self.edges {
             members[edge.object].push(Member {
@@ -389,8 +472,34 @@ impl Engine<'_> {
                 density_per_m2: m.density,
                 scores: m.scores.map(|s| [s.object, s.clutter, s.variance]),
                 detectability: m.curve.values().to_vec(),
+                biases: self.biases(problem, &shared.biases),
+                repetition: shared.repetition,
+                drift: m.drift,
             },
         }
+    }
+}
+
+impl Engine<'_> {
+    fn biases(&self, problem: &Problem<'_>, biases: &[(Term, f64)]) -> Vec<Bias> {
+        let order = super::data::order(problem.views);
+        let of_sensor = |sensor: usize| {
+            let at = self.platforms.iter().position(|p| p.sensor == sensor)?;
+            problem.views.get(order[at])
+        };
+        let bias = |(term, sigma): &(Term, f64)| {
+            let view = of_sensor(term.sensor);
+            Bias {
+                platform: view.and_then(|v| v.platform.as_deref()).map(str::to_owned),
+                camera: view
+                    .and_then(|v| v.camera.as_deref())
+                    .map(|c| c.name.to_string()),
+                of: term.of,
+                value: term.value,
+                sigma: *sigma,
+            }
+        };
+        biases.iter().map(bias).collect()
     }
 }
 

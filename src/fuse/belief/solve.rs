@@ -7,6 +7,7 @@ use super::algebra::{
     self, ByPose, Factor4, Square4, Square6, add_information, from_matrix, inverse4, inverse6,
     to_matrix4,
 };
+use super::chain::Bordered;
 use super::engine::{Edge, Engine};
 use super::looks::Repeats;
 use super::noise::{robust_weight, with_noise};
@@ -53,42 +54,26 @@ pub(super) enum Robust {
     Scale(f64),
 }
 
-struct Row {
-    object: usize,
-    view: usize,
+/// The rows of a detection that may be of an object.
+pub(super) struct Row {
+    pub(super) look: usize,
+    pub(super) object: usize,
+    pub(super) view: usize,
     range_m: f64,
-    by_object: Square4,
-    by_pose: ByPose,
-    n: usize,
-    e: [f64; 4],
+    /// The slant range that is expected.
+    pub(super) slant_m: f64,
+    pub(super) by_object: Square4,
+    pub(super) by_pose: ByPose,
+    pub(super) n: usize,
+    pub(super) e: [f64; 4],
     /// Weighted information of the rows.
-    information: Square4,
+    pub(super) information: Square4,
 }
 
 impl Engine<'_> {
     /// One Gauss-Newton step, which moves the objects of the part and the poses of its views.
     pub(super) fn step(&mut self, part: Part<'_>, robust: Robust, marginals: bool) -> Stepped {
-        let mut normal = self.begin_normal(&part);
-        if part.edges.len() < CHUNK {
-            for (edge, worth) in part.edges.iter().zip(part.worth) {
-                if let Some(row) = self.row(edge, *worth, part.objects, robust) {
-                    normal.add(&row, part.moving, self.corrects_poses());
-                }
-            }
-        } else {
-            let chunks = part.edges.chunks(CHUNK).zip(part.worth.chunks(CHUNK));
-            for (edges, worths) in chunks {
-                let objects: &[[f64; 4]] = part.objects;
-                let rows: Vec<Option<Row>> = edges
-                    .par_iter()
-                    .zip(worths)
-                    .map(|(edge, worth)| self.row(edge, *worth, objects, robust))
-                    .collect();
-                for row in rows.iter().flatten() {
-                    normal.add(row, part.moving, self.corrects_poses());
-                }
-            }
-        }
+        let mut normal = self.normal(&part, robust, |_| ());
         let conditional: Vec<Square4> = normal.information.iter().map(inverse_or_zero).collect();
         let nearest_m = std::mem::take(&mut normal.nearest_m);
         let (steps, marginal) = if self.corrects_poses() {
@@ -117,6 +102,39 @@ impl Engine<'_> {
             marginal,
             move_m,
         }
+    }
+
+    /// The normal equations of a part, every row shown to `each`.
+    pub(super) fn normal(
+        &self,
+        part: &Part<'_>,
+        robust: Robust,
+        mut each: impl FnMut(&Row),
+    ) -> Normal {
+        let mut normal = self.begin_normal(part);
+        let mut take = |row: &Row| {
+            normal.add(row, part.moving, self.corrects_poses());
+            each(row);
+        };
+        let objects: &[[f64; 4]] = part.objects;
+        if part.edges.len() < CHUNK {
+            for (edge, worth) in part.edges.iter().zip(part.worth) {
+                if let Some(row) = self.row(edge, *worth, objects, robust) {
+                    take(&row);
+                }
+            }
+            return normal;
+        }
+        let chunks = part.edges.chunks(CHUNK).zip(part.worth.chunks(CHUNK));
+        for (edges, worths) in chunks {
+            let rows: Vec<Option<Row>> = edges
+                .par_iter()
+                .zip(worths)
+                .map(|(edge, worth)| self.row(edge, *worth, objects, robust))
+                .collect();
+            rows.iter().flatten().for_each(&mut take);
+        }
+        normal
     }
 
     /// The normal equations before any look: priors, and looks that were folded into objects.
@@ -198,9 +216,11 @@ impl Engine<'_> {
             }
         }
         Some(Row {
+            look: edge.look,
             object: edge.object,
             view: look.view,
             range_m: seen.range_m,
+            slant_m: seen.values[3],
             by_object,
             by_pose,
             n: look.n,
@@ -220,28 +240,23 @@ impl Engine<'_> {
         moving: &[usize],
         marginals: bool,
     ) -> (Vec<[f64; 4]>, Option<(Vec<Square4>, Vec<Square6>)>) {
-        let objects: Vec<ObjectBlock> = normal
-            .information
-            .iter()
-            .zip(&normal.pull)
-            .map(|(a, b)| (to_matrix4(a), Vector4::from(*b)))
-            .collect();
-        let n_objects = objects.len();
-        let spacing = normal.spacing;
-        let solution = if spacing == 1 && 4 * objects.len() < 6 * normal.poses.len() {
-            objects_kept(objects, normal.poses, &normal.couplings, marginals)
-        } else {
-            poses_kept(
-                objects,
-                normal.poses,
-                normal.links,
-                &normal.couplings,
-                marginals,
-            )
-        };
-        let Some((steps, turns, marginal)) = solution else {
+        let (n_objects, spacing) = (normal.information.len(), normal.spacing);
+        let Some((system, (steps, turns))) = System::new(normal) else {
             return (vec![[0.0; 4]; n_objects], None);
         };
+        let marginal = marginals.then(|| {
+            let (objects, poses) = system.covariances();
+            (
+                objects.iter().map(from_matrix).collect(),
+                poses.iter().step_by(spacing).map(from_matrix).collect(),
+            )
+        });
+        self.turn(moving, &turns, spacing);
+        (steps.iter().map(|s| (*s).into()).collect(), marginal)
+    }
+
+    /// Adds to the poses of views, and to their drifts where they have some.
+    pub(super) fn turn(&mut self, moving: &[usize], turns: &[Vector6<f64>], spacing: usize) {
         for (p, &view) in moving.iter().enumerate() {
             let turn = &turns[p * spacing];
             if spacing == 2 {
@@ -255,13 +270,6 @@ impl Engine<'_> {
             }
             self.set_delta(view, delta);
         }
-        let marginal = marginal.map(|(objects, poses)| {
-            (
-                objects.iter().map(from_matrix).collect(),
-                poses.iter().step_by(spacing).map(from_matrix).collect(),
-            )
-        });
-        (steps.iter().map(|s| (*s).into()).collect(), marginal)
     }
 
     /// Covariances of objects as others would see them from these edges, the errors of each pose
@@ -362,6 +370,29 @@ impl Engine<'_> {
         }
     }
 
+    /// What `of` makes of all objects, edges and views at this moment.
+    pub(super) fn whole<T>(&mut self, of: impl FnOnce(&Self, &Part<'_>) -> T) -> T {
+        let edges = std::mem::take(&mut self.edges);
+        let mut objects = std::mem::take(&mut self.objects);
+        let views: Vec<(usize, usize)> = edges
+            .iter()
+            .map(|e| (e.object, self.looks[e.look].view))
+            .collect();
+        let worth = self.worth(&objects, &views, Repeats::Errors);
+        let moving: Vec<usize> = (0..self.n_views()).collect();
+        let part = Part {
+            objects: &mut objects,
+            edges: &edges,
+            worth: &worth,
+            moving: &moving,
+            folded: None,
+        };
+        let made = of(self, &part);
+        self.edges = edges;
+        self.objects = objects;
+        made
+    }
+
     /// Gauss-Newton steps of all objects and poses; with marginal covariances of the last if asked.
     pub(super) fn adjust(
         &mut self,
@@ -404,17 +435,17 @@ impl Engine<'_> {
 }
 
 /// The normal equations on their way.
-struct Normal {
-    information: Vec<Square4>,
-    pull: Vec<[f64; 4]>,
+pub(super) struct Normal {
+    pub(super) information: Vec<Square4>,
+    pub(super) pull: Vec<[f64; 4]>,
     /// How near the nearest view of each object is, metres.
     nearest_m: Vec<f64>,
-    poses: Vec<PoseBlock>,
+    pub(super) poses: Vec<PoseBlock>,
     couplings: Vec<Coupling>,
     /// Couplings between poses, where they drift.
     links: Vec<(usize, usize, SMatrix<f64, 6, 6>)>,
     /// How many unknowns a view has among the poses: itself, and its drift.
-    spacing: usize,
+    pub(super) spacing: usize,
 }
 
 impl Normal {
@@ -438,11 +469,11 @@ impl Normal {
 
 impl Row {
     /// The weighted residual.
-    fn toward(&self) -> [f64; 4] {
+    pub(super) fn toward(&self) -> [f64; 4] {
         times(&self.information, &self.e)
     }
 
-    fn object_pull(&self, toward: &[f64; 4]) -> [f64; 4] {
+    pub(super) fn object_pull(&self, toward: &[f64; 4]) -> [f64; 4] {
         std::array::from_fn(|i| (0..self.n).map(|r| self.by_object[r][i] * toward[r]).sum())
     }
 
@@ -488,19 +519,94 @@ fn inverse_or_zero(a: &Square4) -> Square4 {
     inverse4(a).map_or([[0.0; 4]; 4], |(inverse, _)| inverse)
 }
 
-type ObjectBlock = (SMatrix<f64, 4, 4>, Vector4<f64>);
-type PoseBlock = (SMatrix<f64, 6, 6>, Vector6<f64>);
-type Coupling = (usize, usize, SMatrix<f64, 4, 6>);
-type Diagonals = (Vec<SMatrix<f64, 4, 4>>, Vec<SMatrix<f64, 6, 6>>);
-type Solution = (Vec<Vector4<f64>>, Vec<Vector6<f64>>, Option<Diagonals>);
+pub(super) type ObjectBlock = (SMatrix<f64, 4, 4>, Vector4<f64>);
+pub(super) type PoseBlock = (SMatrix<f64, 6, 6>, Vector6<f64>);
+pub(super) type Coupling = (usize, usize, SMatrix<f64, 4, 6>);
+pub(super) type Steps = (Vec<Vector4<f64>>, Vec<Vector6<f64>>);
+
+/// Solved normal equations, with whichever family of unknowns makes the smaller system kept.
+pub(super) enum System {
+    PosesKept(Solved<6, 4>),
+    ObjectsKept(Solved<4, 6>),
+    /// Poses that drift are a chain, which few objects border.
+    Bordered(Box<Bordered>),
+}
+
+impl System {
+    /// The system, and the steps of objects and poses; `None` where it is not positive definite.
+    pub(super) fn new(normal: Normal) -> Option<(Self, Steps)> {
+        let objects: Vec<ObjectBlock> = normal
+            .information
+            .iter()
+            .zip(&normal.pull)
+            .map(|(a, b)| (to_matrix4(a), Vector4::from(*b)))
+            .collect();
+        let Normal {
+            poses,
+            couplings,
+            links,
+            spacing,
+            ..
+        } = normal;
+        if spacing == 2 && super::drift::few(poses.len() / 2, objects.len()) {
+            let bordered = Bordered::new(&objects, &poses, links, &couplings)?;
+            let sides: Vec<Vector4<f64>> = objects.iter().map(|o| o.1).collect();
+            let pulls: Vec<Vector6<f64>> = poses.iter().map(|p| p.1).collect();
+            let both = bordered.solve(&sides, &pulls);
+            return Some((Self::Bordered(Box::new(bordered)), both));
+        }
+        if spacing == 1 && 4 * objects.len() < 6 * poses.len() {
+            let mut solved = objects_kept(objects, poses, &couplings)?;
+            let steps = solved.kept.clone();
+            let turns = std::mem::take(&mut solved.eliminated);
+            return Some((Self::ObjectsKept(solved), (steps, turns)));
+        }
+        let mut solved = poses_kept(objects, poses, links, &couplings)?;
+        let turns = solved.kept.clone();
+        let steps = std::mem::take(&mut solved.eliminated);
+        Some((Self::PosesKept(solved), (steps, turns)))
+    }
+
+    /// The solution for other right-hand sides, of objects and of poses.
+    pub(super) fn again(&self, objects: &[Vector4<f64>], poses: &[Vector6<f64>]) -> Steps {
+        match self {
+            Self::PosesKept(solved) => {
+                let (poses, objects) = solved.again(poses, objects);
+                (objects, poses)
+            }
+            Self::ObjectsKept(solved) => solved.again(objects, poses),
+            Self::Bordered(bordered) => bordered.solve(objects, poses),
+        }
+    }
+
+    /// Logarithm of the determinant of the normal equations.
+    pub(super) fn ln_det(&self) -> f64 {
+        match self {
+            Self::PosesKept(solved) => solved.ln_det(),
+            Self::ObjectsKept(solved) => solved.ln_det(),
+            Self::Bordered(bordered) => bordered.ln_det,
+        }
+    }
+
+    /// Marginal covariances of objects and of poses.
+    fn covariances(&self) -> (Vec<SMatrix<f64, 4, 4>>, Vec<SMatrix<f64, 6, 6>>) {
+        match self {
+            Self::PosesKept(solved) => {
+                let (poses, objects) = solved.covariances();
+                (objects, poses)
+            }
+            Self::ObjectsKept(solved) => solved.covariances(),
+            Self::Bordered(bordered) => bordered.covariances(),
+        }
+    }
+}
 
 fn poses_kept(
     objects: Vec<ObjectBlock>,
     poses: Vec<PoseBlock>,
     links: Vec<(usize, usize, SMatrix<f64, 6, 6>)>,
     couplings: &[Coupling],
-    marginals: bool,
-) -> Option<Solution> {
+) -> Option<Solved<6, 4>> {
     let arrow = Arrow {
         links,
         kept: poses,
@@ -509,20 +615,14 @@ fn poses_kept(
             .map(|c| (c.0, c.1, c.2))
             .collect(),
     };
-    let solved: Solved<6, 4> = arrow.solve()?;
-    let diagonals = marginals.then(|| {
-        let (poses, objects) = solved.covariances();
-        (objects, poses)
-    });
-    Some((solved.eliminated, solved.kept, diagonals))
+    arrow.solve()
 }
 
 fn objects_kept(
     objects: Vec<ObjectBlock>,
     poses: Vec<PoseBlock>,
     couplings: &[Coupling],
-    marginals: bool,
-) -> Option<Solution> {
+) -> Option<Solved<4, 6>> {
     let arrow = Arrow {
         links: Vec::new(),
         kept: objects,
@@ -531,9 +631,7 @@ fn objects_kept(
             .map(|c| (c.1, c.0, c.2.transpose()))
             .collect(),
     };
-    let solved: Solved<4, 6> = arrow.solve()?;
-    let diagonals = marginals.then(|| solved.covariances());
-    Some((solved.kept, solved.eliminated, diagonals))
+    arrow.solve()
 }
 
 /// Couplings in an order: numbers are sorted, for the blocks are heavy.

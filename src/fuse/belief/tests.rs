@@ -13,6 +13,7 @@
 
 mod confusion;
 mod recorded;
+mod shared;
 mod solution;
 
 use serde_json::Value;
