@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::algebra::{Square4, Square6};
 use super::classes::{Class, Kinds};
 use super::curve::Detectability;
+use super::cut::Shape;
 use super::data::{Look, Platform, PoseNow, looks, order, platforms};
 use super::expect::{Expected, expect};
 use super::ground::SmoothGround;
@@ -163,7 +164,8 @@ impl<'a> Engine<'a> {
     pub(super) fn new(problem: &Problem<'a>, settings: &'a BeliefSettings) -> Self {
         let order = order(problem.views);
         let platforms = platforms(problem, &order, settings.fov);
-        let looks = looks(problem, &order, settings);
+        let shape = Shape::of(problem.measurements, settings.size_rule);
+        let looks = looks(problem, &order, settings, &shape);
         let n = platforms.len();
         let delta = vec![[0.0; 6]; n];
         let poses: Vec<PoseNow> = platforms.iter().map(|p| p.at(&[0.0; 6])).collect();

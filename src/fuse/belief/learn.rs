@@ -98,7 +98,7 @@ impl Engine<'_> {
         for (edge, worth) in self.edges.iter().zip(&worth) {
             let (look, k) = (&self.looks[edge.look], edge.object);
             any_bearing |= look.is_bearing();
-            let good = edge.weight > 0.5 && support[k] > 1.5 && real[k] > 0.5 && !look.cut.is_any();
+            let good = edge.weight > 0.5 && support[k] > 1.5 && real[k] > 0.5 && look.left.is_none();
             if !good {
                 continue;
             }

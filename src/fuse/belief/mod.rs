@@ -13,7 +13,7 @@
 //! use nalgebra::{UnitQuaternion, Vector2};
 //! use rockmap::adjust::{LevelPlane, Measurement, Problem, Reading};
 //! use rockmap::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
-//! use rockmap::detection::Cut;
+//! use rockmap::detection::{Cut, PixelBox};
 //! use rockmap::frame::{Point, RigidTransform, Rotation, Vector};
 //! use rockmap::fuse::belief::{BeliefSettings, fuse_belief};
 //! use rockmap::pose::{Pose, PoseSigma};
@@ -65,15 +65,21 @@
 //!         let place = Point::new(east_m, north_m, 0.0);
 //!         let in_camera = view.enu_from_camera().expect("a camera").inverse() * place;
 //!         let side_px = 0.3 * intrinsics.fx / in_camera.xyz.z;
+//!         let pixel = camera.pixel(in_camera)?;
 //!         measurements.push(Measurement {
 //!             view: index,
 //!             reading: Reading::Pixel {
-//!                 pixel: camera.pixel(in_camera)?,
+//!                 pixel,
 //!                 sigma_px: Vector2::new(1.5, 1.5),
 //!                 range: None,
 //!             },
 //!             log_size: Some(side_px.ln()),
-//!             box_px: Some(Vector2::new(side_px, side_px)),
+//!             bounds: Some(PixelBox {
+//!                 x_min: pixel.u - 0.5 * side_px,
+//!                 x_max: pixel.u + 0.5 * side_px,
+//!                 y_min: pixel.v - 0.5 * side_px,
+//!                 y_max: pixel.v + 0.5 * side_px,
+//!             }),
 //!             cut: Cut::NONE,
 //!             class: 0,
 //!             score: Some(0.9),
@@ -111,6 +117,7 @@
 //! | `data` | views and detections as the loops read them | 0 |
 //! | `algebra` | four and six rows: factors, inverses, spreads | |
 //! | `expect` | what a view would read of an object, with derivatives by object and pose | 0 |
+//! | `cut` | what is left of boxes that the picture's border cuts | |
 //! | `noise` | variances of readings, the contaminated normal, its robust weight | 0, 3.1 |
 //! | `engine` | everything believed at one moment; priors of objects, the background of detections | 0, 3.1 |
 //! | `ground`, `footprint` | heights looked up; ground and room that views see | 0, 3.1 |
@@ -137,6 +144,7 @@ mod algebra;
 mod associate;
 mod classes;
 mod curve;
+mod cut;
 mod data;
 mod drift;
 mod engine;

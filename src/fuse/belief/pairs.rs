@@ -261,25 +261,33 @@ impl Engine<'_> {
 
     fn candidate(&self, look: usize, index: usize, pair: &PairInFull) -> Option<CandidateInFull> {
         let detection = &self.looks[look];
+        let ends = pair.seen.of_ends(detection);
+        let (expected, spread) = match &ends {
+            Some(ends) => (
+                &ends.values,
+                &pair.seen.spread_of_ends(detection, &pair.spread),
+            ),
+            None => (&pair.seen.values, &pair.spread),
+        };
         // The column alone rules most detections out.
         let mut e = [0.0; 4];
-        e[0] = detection.values[0] - pair.seen.values[0];
+        e[0] = detection.values[0] - expected[0];
         if detection.is_bearing() {
             e[0] = super::expect::wrapped(e[0]);
         }
         let loose = self.looseness[look];
-        if e[0] * e[0] > GATE * (pair.spread[0][0] + WIDE * loose[0]) {
+        if e[0] * e[0] > GATE * (spread[0][0] + WIDE * loose[0]) {
             return None;
         }
         for r in 1..detection.n {
             if detection.has[r] {
-                e[r] = detection.values[r] - pair.seen.values[r];
-                if e[r] * e[r] > GATE * (pair.spread[r][r] + WIDE * loose[r]) {
+                e[r] = detection.values[r] - expected[r];
+                if e[r] * e[r] > GATE * (spread[r][r] + WIDE * loose[r]) {
                     return None;
                 }
             }
         }
-        let spread = struck(&pair.spread, &detection.has);
+        let spread = struck(spread, &detection.has);
         let rows = (detection.n, detection.n_rows());
         let (ln_likelihood, m2) = log_likelihood(&e, &spread, &loose, rows)?;
         (m2 < GATE).then_some(CandidateInFull {

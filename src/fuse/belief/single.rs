@@ -107,7 +107,7 @@ impl Engine<'_> {
         if look.is_bearing() {
             return Some(platform.along(pose, look.values[0]));
         }
-        let pixel = Pixel::new(look.values[0], look.values[1]);
+        let pixel = Pixel::new(look.mark[0], look.mark[1]);
         let ray = platform.camera.as_deref()?.ray(pixel).ok()?;
         Some(pose.from_camera * ray.direction.xyz())
     }
@@ -154,7 +154,7 @@ impl Engine<'_> {
             .zip(hits)
             .filter_map(|(look, hit)| {
                 let at = (*hit)?;
-                let log_px = look.log_px.filter(|_| !look.cut.is_any())?;
+                let log_px = look.log_px.filter(|_| look.left.is_none())?;
                 let seen = self.expect(look.view, &[at.x, at.y, at.z, 0.0])?;
                 (seen.range_m < self.ranges_m.1).then_some(log_px - seen.log_scale)
             })
