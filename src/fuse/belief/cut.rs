@@ -8,10 +8,11 @@
 use super::SizeRule;
 use super::algebra::Square4;
 use super::data::Look;
-use super::engine::Normal;
+use super::engine::{Engine, Normal};
+use super::evidence::Evidence;
 use super::expect::Expected;
 use super::single::median;
-use crate::adjust::Measurement;
+use crate::adjust::{Measurement, Reading};
 use crate::detection::{Cut, PixelBox, Side};
 
 /// What is cut off, as a share of what an object is long, is anything up to about four fifths: the
@@ -21,13 +22,19 @@ const MORE: (f64, f64) = (0.5, 0.5);
 /// one standard deviation as a share of its length. An ellipse of which a quarter is left is nine
 /// tenths as wide.
 const OTHER: f64 = 0.1;
-/// How uncertain the mark of a side is of which both ends are cut, as a share of its length; and of
-/// the other side of one of which that is not said.
+/// How uncertain the mark of a side is of which both ends are cut, one standard deviation as a share
+/// of its length.
 const LOST: f64 = 0.5;
 /// Fewer whole boxes say nothing about shapes; the logarithm of a side over the other has this
 /// standard deviation then, and no less with more.
 const LEAST_BOXES: usize = 6;
 const SHAPE_SIGMA: (f64, f64) = (0.5, 0.05);
+/// The share of objects that are detected although their aim point lies beyond the border, before any
+/// data; it counts for so many looks.
+pub(super) const START_BORDER: f64 = 0.5;
+const BORDER_COUNT: f64 = 1.0;
+/// Objects less likely beyond the border say nothing of it.
+const LEAST_BEYOND: f64 = 0.05;
 
 /// How long boxes are along and down, over the side that says how large objects are: logarithms.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,6 +83,17 @@ impl Shape {
     }
 }
 
+/// Where in boxes the aim points lie, as shares of their lengths.
+pub(super) fn aim(measurements: &[Measurement]) -> [f64; 2] {
+    let shares = measurements.iter().filter_map(|m| {
+        let (b, Reading::Pixel { pixel, .. }) = (m.bounds?, m.reading) else {
+            return None;
+        };
+        (b.height() > 0.0).then(|| (pixel.v - b.y_min) / b.height())
+    });
+    [0.5, median(shares.collect()).unwrap_or(0.5)]
+}
+
 /// What is left of a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Left {
@@ -88,8 +106,8 @@ pub(super) struct Left {
     spreads: [f64; 2],
     /// No less than this is the size of the whole, pixels.
     size_px: f64,
-    /// Whether the side that says the size is cut.
-    is_size_cut: bool,
+    /// The side that says the size.
+    size_side: Side,
 }
 
 impl Left {
@@ -97,7 +115,7 @@ impl Left {
         let sides = [cut.across, cut.down];
         let seen_px = [bounds.width(), bounds.height()];
         let ratios = shape.sides.map(|side| side.mean.exp());
-        let of_size = match rule {
+        let size_side = match rule {
             SizeRule::Width => cut.across,
             SizeRule::Height => cut.down,
         };
@@ -108,7 +126,7 @@ impl Left {
             ratios,
             spreads: shape.sides.map(|side| side.variance),
             size_px: (seen_px[0] / ratios[0]).max(seen_px[1] / ratios[1]),
-            is_size_cut: of_size != Side::Whole,
+            size_side,
         })
     }
 
@@ -122,12 +140,10 @@ impl Left {
 
     /// Logarithm of the size, read off what is seen of it.
     pub(super) fn log_size(&self, seen: f64) -> f64 {
-        let one_end = self
-            .sides
-            .iter()
-            .zip(&self.spreads)
-            .any(|(side, &spread)| spread == 0.0 && matches!(side, Side::Cut { .. }));
-        if one_end { seen + MORE.0 } else { seen }
+        match self.size_side {
+            Side::Cut { .. } => seen + MORE.0,
+            _ => seen,
+        }
     }
 
     /// No less than this is the size of the whole, pixels.
@@ -146,7 +162,10 @@ impl Left {
                 Side::Lost => (LOST * length_px).powi(2),
             };
         }
-        more[2] = if self.is_size_cut { MORE.1 } else { OTHER }.powi(2);
+        more[2] = match self.size_side {
+            Side::Whole => OTHER.powi(2),
+            _ => MORE.1.powi(2),
+        };
         more
     }
 
@@ -164,6 +183,26 @@ impl Left {
             }
             _ => (0.0, 0.0),
         })
+    }
+}
+
+impl Engine<'_> {
+    /// How often objects are detected whose aim point lies beyond the border: some detectors mark
+    /// what is left of them, others leave them out. Least squares over the views that other views'
+    /// objects may be at the border of.
+    pub(super) fn learn_border(&mut self, evidence: &Evidence, real: &[f64], support: &[f64]) {
+        let (mut hits, mut chances) = (BORDER_COUNT * START_BORDER, BORDER_COUNT);
+        let pairs = evidence.expectation.pairs.iter().zip(&evidence.detected);
+        for ((pair, q), worth) in pairs.zip(&evidence.worth) {
+            let k = pair.object;
+            if support[k] - *q > 0.8 && real[k] > 0.5 && pair.beyond > LEAST_BEYOND {
+                let p = self.model.curve.at(pair.visibility);
+                let weight = real[k] * worth * pair.beyond;
+                hits += weight * (q - p * pair.inside);
+                chances += weight * p * pair.beyond;
+            }
+        }
+        self.model.border = (hits / chances).clamp(0.0, 1.0);
     }
 }
 

@@ -85,6 +85,9 @@ pub(super) struct Model {
     /// Objects, 1/m^2.
     pub(super) density: f64,
     pub(super) curve: Detectability,
+    /// How much of that holds for an object whose aim point lies beyond the picture's border, while
+    /// part of it lies within.
+    pub(super) border: f64,
     /// Logits of scores, where detections have them.
     pub(super) scores: Option<Scores>,
 }
@@ -138,6 +141,13 @@ pub(super) struct Engine<'a> {
     pub(super) untrusted: Vec<(usize, Singleton)>,
     pub(super) background: Vec<Background>,
     pub(super) has_sizes: bool,
+    /// How long boxes are along and down.
+    pub(super) shape: Shape,
+    /// Where in boxes the aim points lie, as shares of their lengths.
+    pub(super) aim: [f64; 2],
+    /// How well a single detection near the end of the trusted ranges says its range, one standard
+    /// deviation, and how far beyond the end it is still trusted, metres.
+    pub(super) blur_m: (f64, f64),
     /// Which classes are taken for which, where they are.
     pub(super) kinds: Option<Arc<Kinds>>,
     pub(super) model: Model,
@@ -192,6 +202,7 @@ impl<'a> Engine<'a> {
             density: 1.0,
             curve: Detectability::new(0.0, 1.0, 1),
             scores: None,
+            border: super::cut::START_BORDER,
         };
         let mut engine = Self {
             surface: problem.surface,
@@ -212,6 +223,9 @@ impl<'a> Engine<'a> {
             untrusted: Vec::new(),
             background: Vec::new(),
             has_sizes,
+            shape,
+            aim: super::cut::aim(problem.measurements),
+            blur_m: (0.0, 0.0),
             kinds,
             model,
             looseness: Vec::new(),
@@ -294,13 +308,15 @@ impl<'a> Engine<'a> {
     }
 
     /// What a view has for and against an object at a horizontal distance: its ranges are 5 cm and
-    /// 2 % of the distance soft.
+    /// 2 % of the distance soft, and which detections lie within the greatest is told by each one's
+    /// own range.
     pub(super) fn in_range(&self, range_m: f64) -> f64 {
         let soft_m = 0.05 + 0.02 * range_m;
+        let (blur_m, slack_m) = self.blur_m;
         let (least_m, most_m) = (self.ranges_m.0, self.reach_m);
         let mut p = 1.0;
         if most_m.is_finite() {
-            p *= normal_cdf((most_m - range_m) / soft_m);
+            p *= normal_cdf((most_m + slack_m - range_m) / soft_m.hypot(blur_m));
         }
         p * normal_cdf((range_m - least_m) / soft_m)
     }

@@ -79,6 +79,7 @@ impl Engine<'_> {
         self.learn_heights(&real, &support);
         self.learn_rates(evidence, &real, &support);
         self.learn_curve(evidence, &real, &support);
+        self.learn_border(evidence, &real, &support);
         self.learn_scores(evidence);
         self.looseness = self.looks.iter().map(|l| self.variances(l)).collect();
     }
@@ -98,7 +99,8 @@ impl Engine<'_> {
         for (edge, worth) in self.edges.iter().zip(&worth) {
             let (look, k) = (&self.looks[edge.look], edge.object);
             any_bearing |= look.is_bearing();
-            let good = edge.weight > 0.5 && support[k] > 1.5 && real[k] > 0.5 && look.left.is_none();
+            let good =
+                edge.weight > 0.5 && support[k] > 1.5 && real[k] > 0.5 && look.left.is_none();
             if !good {
                 continue;
             }
