@@ -279,13 +279,10 @@ impl Engine<'_> {
         if !most_m.is_finite() {
             return;
         }
-        let along = self
-            .looks
-            .iter()
-            .zip(&self.singles)
-            .filter_map(|(look, single)| {
-                (single.range_m > NEAR_END * most_m).then(|| self.along_m(look, single))
-            });
+        let singles = self.looks.iter().zip(&self.singles);
+        let along = singles
+            .filter(|(_, single)| single.range_m > NEAR_END * most_m)
+            .map(|(look, single)| self.along_m(look, single));
         let along_m = median(along.collect()).unwrap_or(0.0);
         self.blur_m = (along_m, along_m.min(SLACK * most_m));
     }
