@@ -3,7 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::Surface;
-use crate::detection::{Cut, Detection, Mark};
+use crate::detection::{Aim, Cut, Detection, Mark, PixelBox};
 use crate::frame::Pixel;
 use crate::project::{LineOfSight, Miss, Range, Settings, sight};
 use crate::view::View;
@@ -58,8 +58,8 @@ pub struct Measurement {
     pub reading: Reading,
     /// Natural logarithm of the apparent width in pixels, where the mark shows a whole object.
     pub log_size: Option<f64>,
-    /// Width and height of the mark's box, pixels, where it has one.
-    pub box_px: Option<Vector2<f64>>,
+    /// The mark's box, where it is one.
+    pub bounds: Option<PixelBox>,
     /// What the picture's border takes away of it.
     pub cut: Cut,
     /// What the detector says it is; measurements of one object share it, unless the detector takes
@@ -157,23 +157,27 @@ impl Measurement {
             view: index,
             reading,
             log_size: log_size(detection, view),
-            box_px: match detection.mark {
-                Mark::Box(b) => Some(Vector2::new(b.width(), b.height())),
+            bounds: match detection.mark {
+                Mark::Box(b) => Some(b),
                 _ => None,
             },
-            cut: cut(detection, view),
+            cut: cut(detection, view, &reading, settings.aim),
             class: 0,
             score: detection.score,
         })
     }
 }
 
-/// Boxes nearer than this to the picture's border are taken for cut by it, pixels.
-const BORDER_PX: f64 = 3.0;
+/// Boxes nearer than this to the picture's border are taken for cut by it: pixels, and standard
+/// deviations of what is read off boxes, whichever is more.
+const BORDER: (f64, f64) = (3.0, 2.0);
 
-fn cut(detection: &Detection, view: &View) -> Cut {
-    match (detection.mark, view.camera.as_deref()) {
-        (Mark::Box(b), Some(camera)) => b.cut(camera.width, camera.height, BORDER_PX),
+fn cut(detection: &Detection, view: &View, reading: &Reading, aim: Aim) -> Cut {
+    match (detection.mark, view.camera.as_deref(), reading) {
+        (Mark::Box(b), Some(camera), Reading::Pixel { sigma_px, .. }) => {
+            let margin = BORDER.0.max(BORDER.1 * sigma_px.max());
+            b.cut(camera.width, camera.height, margin, aim)
+        }
         _ => Cut::NONE,
     }
 }

@@ -140,35 +140,73 @@ impl PixelBox {
         ]
     }
 
-    /// Which of its sides the border cuts, at either of their ends.
-    pub fn cut(&self, width: u32, height: u32, margin: f64) -> Cut {
+    /// What the border of a picture of this size takes away of it, as [`PixelBox::cut_ends`], and
+    /// where an object's aim point lies from the ends that are left.
+    pub fn cut(&self, width: u32, height: u32, margin: f64, aim: Aim) -> Cut {
         let [across, down] = self.cut_ends(width, height, margin);
+        let Aim::HeightShare(share) = aim;
         Cut {
-            across: across.0 || across.1,
-            down: down.0 || down.1,
+            across: Side::new(across, (self.x_min, self.x_max), 0.5),
+            down: Side::new(down, (self.y_min, self.y_max), share),
         }
     }
 }
 
 /// What a picture's border takes away of a box.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cut {
-    /// Part of its width.
-    pub across: bool,
-    /// Part of its height.
-    pub down: bool,
+    /// Of its width.
+    pub across: Side,
+    /// Of its height.
+    pub down: Side,
+}
+
+/// What a picture's border takes away of a box along one of its sides.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Side {
+    /// Nothing.
+    #[default]
+    Whole,
+    /// One of its ends: the object goes on beyond the border.
+    Cut {
+        /// The end that is left, pixels.
+        end_px: f64,
+        /// From that end to the aim point of the whole object, as a share of the whole's length.
+        to_aim: f64,
+    },
+    /// Both ends.
+    Lost,
+}
+
+impl Side {
+    /// A side whose ends, low and high, are cut or not, with the share of its length that lies
+    /// before the aim point.
+    fn new(cut: (bool, bool), (low_px, high_px): (f64, f64), share: f64) -> Self {
+        match cut {
+            (false, false) => Self::Whole,
+            (true, true) => Self::Lost,
+            (true, false) => Self::Cut {
+                end_px: high_px,
+                to_aim: share - 1.0,
+            },
+            (false, true) => Self::Cut {
+                end_px: low_px,
+                to_aim: share,
+            },
+        }
+    }
 }
 
 impl Cut {
     /// Nothing.
     pub const NONE: Self = Self {
-        across: false,
-        down: false,
+        across: Side::Whole,
+        down: Side::Whole,
     };
 
     /// Whether it takes anything.
     pub fn is_any(self) -> bool {
-        self.across || self.down
+        self != Self::NONE
     }
 }
 
@@ -201,13 +239,19 @@ mod tests {
                 x_max,
                 y_max,
             };
-            let cut = b.cut(640, 480, 3.0);
+            let cut = b.cut(640, 480, 3.0, Aim::BOTTOM);
             (cut.across, cut.down)
         };
-        assert_eq!(cut(10.0, 10.0, 50.0, 50.0), (false, false));
-        assert_eq!(cut(-0.5, 10.0, 50.0, 50.0), (true, false));
-        assert_eq!(cut(600.0, 450.0, 637.0, 481.0), (true, true));
+        let left = |end_px, to_aim| Side::Cut { end_px, to_aim };
+        let whole = Side::Whole;
+        assert_eq!(cut(10.0, 10.0, 50.0, 50.0), (whole, whole));
+        assert_eq!(cut(-0.5, 10.0, 50.0, 50.0), (left(50.0, -0.5), whole));
+        let corner = (left(600.0, 0.5), left(450.0, 1.0));
+        assert_eq!(cut(600.0, 450.0, 637.0, 481.0), corner);
+        // What stands at the lower edge is left where the upper one is cut.
+        assert_eq!(cut(10.0, 0.0, 50.0, 50.0), (whole, left(50.0, 0.0)));
+        assert_eq!(cut(-1.0, 10.0, 639.0, 50.0), (Side::Lost, whole));
         // Too far out for a border that cuts.
-        assert_eq!(cut(-9.0, 10.0, 50.0, 485.0), (false, false));
+        assert_eq!(cut(-9.0, 10.0, 50.0, 485.0), (whole, whole));
     }
 }

@@ -114,8 +114,9 @@ fn detect_in(
     let mut rng = stream(scene.seed, Purpose::Detector, index);
     let mut found = Vec::new();
     let mut visible = Vec::new();
-    for (i, rock) in field.rocks().iter().enumerate() {
-        let Some(seen) = appearance(camera, &pose, rock) else {
+    let eye = pose.origin().xyz;
+    for i in field.near(eye.x, eye.y, detector.max_range_m) {
+        let Some(seen) = appearance(camera, &pose, &field.rocks()[i]) else {
             continue;
         };
         if !in_range(detector, seen.range_m) {

@@ -137,6 +137,23 @@ impl<'a> Field<'a> {
         &self.members[self.starts[cell]..self.starts[cell + 1]]
     }
 
+    /// All rocks whose places lie within a horizontal distance of a place, and others near it;
+    /// ascending.
+    pub(super) fn near(&self, x: f64, y: f64, within_m: f64) -> Vec<usize> {
+        let last = |n: usize| n.saturating_sub(1);
+        let columns = self.column(x - within_m)..=self.column(x + within_m).min(last(self.columns));
+        let mut rocks = Vec::new();
+        for row in self.row(y - within_m)..=self.row(y + within_m).min(last(self.rows)) {
+            for column in columns.clone() {
+                let cell = row * self.columns + column;
+                rocks.extend(&self.members[self.starts[cell]..self.starts[cell + 1]]);
+            }
+        }
+        rocks.sort_unstable();
+        rocks.dedup();
+        rocks
+    }
+
     /// The first rock a ray meets before `reach_m`, other than `except`.
     pub fn first_hit(&self, ray: Ray<Enu>, reach_m: f64, except: Option<usize>) -> Option<RockHit> {
         let mut best: Option<RockHit> = None;
@@ -362,4 +379,28 @@ fn whole(x: f64) -> usize {
     )]
     let whole = x.clamp(0.0, 1e6) as usize;
     whole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{Scene, simulate};
+
+    #[test]
+    fn every_rock_near_a_place_is_found_near_it() {
+        let scene = Scene::parse("[rocks]\nnumber = 300\n", "scene.toml").unwrap();
+        let rocks = simulate(&scene).rocks;
+        let field = Field::new(&rocks);
+        for (x, y, within_m) in [(10.0, 0.0, 3.0), (-30.0, 4.0, 29.0), (60.0, -50.0, 5.0)] {
+            let near = field.near(x, y, within_m);
+            assert!(near.is_sorted());
+            let apart = |rock: &Rock| (rock.place.xyz.x - x).hypot(rock.place.xyz.y - y);
+            for (i, rock) in rocks.iter().enumerate() {
+                assert!(apart(rock) > within_m || near.contains(&i), "{i}");
+            }
+        }
+        assert!(field.near(10.0, 0.0, 3.0).len() < 100);
+        assert_eq!(field.near(0.0, 0.0, f64::INFINITY).len(), rocks.len());
+        assert!(Field::new(&[]).near(0.0, 0.0, 5.0).is_empty());
+    }
 }

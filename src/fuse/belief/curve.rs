@@ -158,20 +158,9 @@ mod tests {
         assert_eq!(curve.at(1.3), 0.5);
         // 14 looks in the second bin, 13 of them detections; nothing elsewhere.
         curve.learn((0..14).map(|i| (1.5, 1.0, if i == 0 { 0.0 } else { 1.0 })));
-        // One bin's looks say of no other that it differs.
-        let mean = (13.0 + 1.0) / (14.0 + 2.0);
-        for (bin, (n, y)) in [(0.0, 0.0), (14.0, 13.0), (0.0, 0.0), (0.0, 0.0)]
-            .iter()
-            .enumerate()
-        {
-            let x = f64::from(u8::try_from(bin).unwrap()) + 0.5;
-            let flat = (y + SMOOTH_COUNT * mean) / (n + SMOOTH_COUNT);
-            assert!(
-                (curve.at(x) - flat).abs() < 0.03,
-                "{bin}: {} {flat}",
-                curve.at(x)
-            );
-        }
+        // What the bins have seen of their own stands before what the rise says.
+        let seen = (13.0 + SMOOTH_COUNT * 1.0) / (14.0 + SMOOTH_COUNT);
+        assert!((curve.at(1.5) - seen).abs() < 0.05, "{}", curve.at(1.5));
         let middle = 0.5 * (curve.at(1.5) + curve.at(2.5));
         assert!((curve.at(2.0) - middle).abs() < 1e-15);
         assert_eq!(curve.at(-3.0), curve.values()[0]);

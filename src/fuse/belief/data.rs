@@ -6,10 +6,10 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::algebra::{Square6, from_matrix};
+use super::cut::{Left, Shape};
 use super::{BeliefSettings, SizeRule};
 use crate::adjust::{Measurement, Problem, Reading};
 use crate::camera::{Camera, Lens};
-use crate::detection::Cut;
 use crate::frame::{Body, LocalEnu, Pixel, RigidTransform, Vector};
 use crate::view::View;
 
@@ -59,8 +59,10 @@ pub(super) struct Look {
     pub(super) n: usize,
     /// Logarithm of the apparent size in pixels, where there is one.
     pub(super) log_px: Option<f64>,
-    /// What the picture's border takes away of the mark.
-    pub(super) cut: Cut,
+    /// The aim point of the mark, where it is one.
+    pub(super) mark: [f64; 2],
+    /// What the picture's border leaves of the mark, where it cuts it.
+    pub(super) left: Option<Left>,
     pub(super) class: usize,
     /// Logit of the detector's score.
     pub(super) logit: Option<f64>,
@@ -181,6 +183,7 @@ pub(super) fn looks(
     problem: &Problem<'_>,
     order: &[usize],
     settings: &BeliefSettings,
+    shape: &Shape,
 ) -> Vec<Look> {
     let mut rank = vec![0; order.len()];
     for (i, &view) in order.iter().enumerate() {
@@ -188,20 +191,26 @@ pub(super) fn looks(
     }
     let measurements = problem.measurements.iter().enumerate();
     let mut looks: Vec<Look> = measurements
-        .map(|(i, m)| look(i, m, rank[m.view], settings))
+        .map(|(i, m)| look(i, m, rank[m.view], settings, shape))
         .collect();
     looks.sort_by_key(|look| (look.view, look.measurement));
     looks
 }
 
-fn look(index: usize, m: &Measurement, view: usize, settings: &BeliefSettings) -> Look {
+fn look(
+    index: usize,
+    m: &Measurement,
+    view: usize,
+    settings: &BeliefSettings,
+    shape: &Shape,
+) -> Look {
     let (mut values, mut sigmas, mut has) = ([0.0; 4], [1.0; 4], [false; 4]);
     let mut set = |row: usize, value: f64, sigma: f64| {
         values[row] = value;
         sigmas[row] = sigma;
         has[row] = true;
     };
-    let mut log_px = None;
+    let (mut log_px, mut left, mut mark) = (None, None, [0.0; 2]);
     let range_of;
     match m.reading {
         Reading::Pixel {
@@ -209,11 +218,17 @@ fn look(index: usize, m: &Measurement, view: usize, settings: &BeliefSettings) -
             sigma_px,
             range,
         } => {
-            set(0, pixel.u, sigma_px.x);
-            set(1, pixel.v, sigma_px.y);
+            mark = [pixel.u, pixel.v];
+            left = m
+                .bounds
+                .and_then(|b| Left::of(m.cut, b, shape, settings.size_rule));
+            let [u, v] = left.map_or(mark, |left| left.ends(mark));
+            set(0, u, sigma_px.x);
+            set(1, v, sigma_px.y);
             range_of = range;
             log_px = apparent_size(m, settings.size_rule);
             if let Some(l) = log_px {
+                let l = left.map_or(l, |left| left.log_size(l));
                 set(2, l, settings.log_size_sigma);
             }
         }
@@ -239,17 +254,18 @@ fn look(index: usize, m: &Measurement, view: usize, settings: &BeliefSettings) -
         has,
         n,
         log_px,
-        cut: m.cut,
+        mark,
+        left,
         class: m.class,
         logit: m.score.filter(|_| settings.scores).map(logit),
     }
 }
 
 fn apparent_size(m: &Measurement, rule: SizeRule) -> Option<f64> {
-    let size = m.box_px?;
+    let bounds = m.bounds?;
     let px = match rule {
-        SizeRule::Width => size.x,
-        SizeRule::Height => size.y,
+        SizeRule::Width => bounds.width(),
+        SizeRule::Height => bounds.height(),
     };
     (px > 0.0).then(|| px.ln())
 }

@@ -7,12 +7,13 @@ use super::algebra::{Square4, Square6};
 use super::bias::Term;
 use super::classes::{Class, Kinds};
 use super::curve::Detectability;
+use super::cut::Shape;
 use super::data::{Look, Platform, PoseNow, looks, order, platforms};
+use super::departure::Departure;
 use super::drift::Drift;
 use super::expect::{Expected, expect};
 use super::ground::SmoothGround;
 use super::noise::{Scales, ln_add, variances};
-use super::shape::Shape;
 use super::single::Singleton;
 use super::{BeliefSettings, PoseCorrection};
 use crate::adjust::{Problem, Surface};
@@ -81,7 +82,7 @@ pub(super) struct Model {
     /// Logarithms of sizes of objects, metres.
     pub(super) size: Normal,
     /// How they depart from it.
-    pub(super) size_shape: Shape,
+    pub(super) size_departure: Departure,
     /// Logarithms of apparent sizes of clutter, pixels.
     pub(super) clutter_size: Normal,
     /// Clutter a view.
@@ -91,6 +92,9 @@ pub(super) struct Model {
     /// Objects, 1/m^2.
     pub(super) density: f64,
     pub(super) curve: Detectability,
+    /// How much of that holds for an object whose aim point lies beyond the picture's border, while
+    /// part of it lies within.
+    pub(super) border: f64,
     /// Logits of scores, where detections have them.
     pub(super) scores: Option<Scores>,
 }
@@ -147,6 +151,13 @@ pub(super) struct Engine<'a> {
     pub(super) untrusted: Vec<(usize, Singleton)>,
     pub(super) background: Vec<Background>,
     pub(super) has_sizes: bool,
+    /// How long boxes are along and down.
+    pub(super) shape: Shape,
+    /// Where in boxes the aim points lie, as shares of their lengths.
+    pub(super) aim: [f64; 2],
+    /// How well a single detection near the end of the trusted ranges says its range, one standard
+    /// deviation, and how far beyond the end it is still trusted, metres.
+    pub(super) blur_m: (f64, f64),
     /// Which classes are taken for which, where they are.
     pub(super) kinds: Option<Arc<Kinds>>,
     pub(super) model: Model,
@@ -173,7 +184,8 @@ impl<'a> Engine<'a> {
     pub(super) fn new(problem: &Problem<'a>, settings: &'a BeliefSettings) -> Self {
         let order = order(problem.views);
         let platforms = platforms(problem, &order, settings.fov);
-        let looks = looks(problem, &order, settings);
+        let shape = Shape::of(problem.measurements, settings.size_rule);
+        let looks = looks(problem, &order, settings, &shape);
         let n = platforms.len();
         let delta = vec![[0.0; 6]; n];
         let poses: Vec<PoseNow> = platforms.iter().map(|p| p.at(&[0.0; 6])).collect();
@@ -195,7 +207,7 @@ impl<'a> Engine<'a> {
                 mean: 0.0,
                 variance: 0.4,
             },
-            size_shape: Shape::NORMAL,
+            size_departure: Departure::NORMAL,
             clutter_size: Normal {
                 mean: 0.0,
                 variance: 1.0,
@@ -205,6 +217,7 @@ impl<'a> Engine<'a> {
             density: 1.0,
             curve: Detectability::new(0.0, 1.0, 1),
             scores: None,
+            border: super::cut::START_BORDER,
         };
         let mut engine = Self {
             surface: problem.surface,
@@ -227,6 +240,9 @@ impl<'a> Engine<'a> {
             untrusted: Vec::new(),
             background: Vec::new(),
             has_sizes,
+            shape,
+            aim: super::cut::aim(problem.measurements),
+            blur_m: (0.0, 0.0),
             kinds,
             model,
             looseness: Vec::new(),
@@ -309,13 +325,15 @@ impl<'a> Engine<'a> {
     }
 
     /// What a view has for and against an object at a horizontal distance: its ranges are 5 cm and
-    /// 2 % of the distance soft.
+    /// 2 % of the distance soft, and which detections lie within the greatest is told by each one's
+    /// own range.
     pub(super) fn in_range(&self, range_m: f64) -> f64 {
         let soft_m = 0.05 + 0.02 * range_m;
+        let (blur_m, slack_m) = self.blur_m;
         let (least_m, most_m) = (self.ranges_m.0, self.reach_m);
         let mut p = 1.0;
         if most_m.is_finite() {
-            p *= normal_cdf((most_m - range_m) / soft_m);
+            p *= normal_cdf((most_m + slack_m - range_m) / soft_m.hypot(blur_m));
         }
         p * normal_cdf((range_m - least_m) / soft_m)
     }
@@ -355,7 +373,7 @@ impl<'a> Engine<'a> {
         information[0][0] += FAINT;
         information[1][1] += FAINT;
         let size = &self.model.size;
-        let ln_size = size.ln(x[3]) + self.model.size_shape.ln_ratio(size, x[3]);
+        let ln_size = size.ln(x[3]) + self.model.size_departure.ln_ratio(size, x[3]);
         let ln_density = -0.5 * height_m * height_m / vz - 0.5 * (2.0 * PI * vz).ln() + ln_size;
         Prior {
             information,

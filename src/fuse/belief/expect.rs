@@ -30,9 +30,10 @@ impl Expected {
     #[inline]
     pub(super) fn residual(&self, look: &Look) -> [f64; 4] {
         let mut e = [0.0; 4];
+        let values = self.of_ends(look).map_or(self.values, |ends| ends.values);
         for r in 0..look.n {
             if look.has[r] {
-                e[r] = look.values[r] - self.values[r];
+                e[r] = look.values[r] - values[r];
             }
         }
         if look.is_bearing() {
@@ -44,7 +45,10 @@ impl Expected {
     /// The derivatives with rows that were not read struck out.
     #[inline]
     pub(super) fn of(&self, look: &Look) -> (Square4, ByPose) {
-        let (mut object, mut pose) = (self.by_object, self.by_pose);
+        let ends = self.of_ends(look);
+        let (mut object, mut pose) = ends.map_or((self.by_object, self.by_pose), |ends| {
+            (ends.by_object, ends.by_pose)
+        });
         for r in 0..4 {
             if !look.has[r] {
                 object[r] = [0.0; 4];

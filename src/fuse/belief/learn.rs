@@ -2,11 +2,11 @@
 //! expectation maximisation.
 
 use super::algebra::{self, Square6};
+use super::departure::Departure;
 use super::engine::{Engine, Normal, START_CLUTTER, START_TRANSIENTS, Scores};
 use super::evidence::{Evidence, probability};
 use super::looks::Repeats;
 use super::noise::robust_weight;
-use super::shape::Shape;
 use super::single::LEAST_SCORE_VARIANCE;
 
 /// The stated noise counts for this many readings.
@@ -110,6 +110,7 @@ impl Engine<'_> {
         self.learn_heights(&real, &support);
         self.learn_rates(evidence, &real, &support);
         self.learn_curve(evidence, &real, &support);
+        self.learn_border(evidence, &real, &support);
         self.learn_scores(evidence);
         self.looseness = self.looks.iter().map(|l| self.variances(l)).collect();
     }
@@ -129,7 +130,8 @@ impl Engine<'_> {
         for (edge, worth) in self.edges.iter().zip(&worth) {
             let (look, k) = (&self.looks[edge.look], edge.object);
             any_bearing |= look.is_bearing();
-            let good = edge.weight > 0.5 && support[k] > 1.5 && real[k] > 0.5 && !look.cut.is_any();
+            let good =
+                edge.weight > 0.5 && support[k] > 1.5 && real[k] > 0.5 && look.left.is_none();
             if !good {
                 continue;
             }
@@ -303,7 +305,7 @@ impl Engine<'_> {
             variance: (scatter / n).clamp(SIZE_VARIANCES.0, SIZE_VARIANCES.1),
         };
         let sizes = weights.iter().zip(&self.objects).map(|(w, x)| (*w, x[3]));
-        self.model.size_shape = Shape::learnt(&size, sizes);
+        self.model.size_departure = Departure::learnt(&size, sizes);
         self.model.size = size;
     }
 

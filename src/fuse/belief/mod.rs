@@ -13,7 +13,7 @@
 //! use nalgebra::{UnitQuaternion, Vector2};
 //! use rockmap::adjust::{LevelPlane, Measurement, Problem, Reading};
 //! use rockmap::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
-//! use rockmap::detection::Cut;
+//! use rockmap::detection::{Cut, PixelBox};
 //! use rockmap::frame::{Point, RigidTransform, Rotation, Vector};
 //! use rockmap::fuse::belief::{BeliefSettings, fuse_belief};
 //! use rockmap::pose::{Pose, PoseSigma};
@@ -65,15 +65,21 @@
 //!         let place = Point::new(east_m, north_m, 0.0);
 //!         let in_camera = view.enu_from_camera().expect("a camera").inverse() * place;
 //!         let side_px = 0.3 * intrinsics.fx / in_camera.xyz.z;
+//!         let pixel = camera.pixel(in_camera)?;
 //!         measurements.push(Measurement {
 //!             view: index,
 //!             reading: Reading::Pixel {
-//!                 pixel: camera.pixel(in_camera)?,
+//!                 pixel,
 //!                 sigma_px: Vector2::new(1.5, 1.5),
 //!                 range: None,
 //!             },
 //!             log_size: Some(side_px.ln()),
-//!             box_px: Some(Vector2::new(side_px, side_px)),
+//!             bounds: Some(PixelBox {
+//!                 x_min: pixel.u - 0.5 * side_px,
+//!                 x_max: pixel.u + 0.5 * side_px,
+//!                 y_min: pixel.v - 0.5 * side_px,
+//!                 y_max: pixel.v + 0.5 * side_px,
+//!             }),
 //!             cut: Cut::NONE,
 //!             class: 0,
 //!             score: Some(0.9),
@@ -111,13 +117,14 @@
 //! | `data` | views and detections as the loops read them | 0 |
 //! | `algebra` | four and six rows: factors, inverses, spreads | |
 //! | `expect` | what a view would read of an object, with derivatives by object and pose | 0 |
+//! | `cut` | what is left of boxes that the picture's border cuts | |
 //! | `noise` | variances of readings, the contaminated normal, its robust weight | 0, 3.1 |
 //! | `engine` | everything believed at one moment; priors of objects, the background of detections | 0, 3.1 |
 //! | `ground`, `footprint` | heights looked up; ground and room that views see | 0, 3.1 |
 //! | `single` | what one detection says by itself; where everything starts | 0 |
 //! | `curve` | how often objects are detected, by apparent size or range | 3.1 |
 //! | `classes` | of which class an object is, where the detector takes classes for each other | |
-//! | `shape` | how sizes of objects depart from a lognormal law | |
+//! | `departure` | how sizes of objects depart from a lognormal law | |
 //! | `near` | objects near a place | |
 //! | `pairs` | which objects a view expects, and which detections may be of them | 3.1 |
 //! | `looks` | how many independent looks a row of looks is worth | 3.x |
@@ -143,7 +150,9 @@ mod bias;
 mod chain;
 mod classes;
 mod curve;
+mod cut;
 mod data;
+mod departure;
 mod drift;
 mod effect;
 mod engine;
@@ -160,7 +169,7 @@ mod outcome;
 mod pairs;
 mod register;
 mod sequence;
-mod shape;
+
 mod single;
 mod solve;
 #[cfg(test)]

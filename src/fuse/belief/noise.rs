@@ -7,13 +7,6 @@ use super::data::Look;
 pub(super) const CONTAMINATION: f64 = 0.03;
 /// How many times their variance.
 pub(super) const WIDE: f64 = 25.0;
-/// How uncertain the mark of a box is that a border cuts, one standard deviation as a share of its
-/// size: along the side that is cut, and along the other, since what is left of an object need not
-/// reach as far up and down as the whole.
-const CUT_SHARES: (f64, f64) = (0.5, 0.2);
-/// And this of the logarithm of its size.
-const CUT_LOG_SIZE: f64 = 0.5;
-
 /// Factors on the standard deviations of the four rows, learnt.
 pub(super) type Scales = [f64; 4];
 
@@ -28,16 +21,15 @@ pub(super) fn variances(look: &Look, scales: &Scales, shape: f64) -> [f64; 4] {
         }
     });
     if let Some(log_px) = look.log_px {
-        let px = log_px.exp();
+        let px = look.left.map_or(log_px.exp(), |left| left.size_px());
         let scale = 0.5 * (scales[0] + scales[1]);
         let own = (shape * px * scale).powi(2);
         r[0] += own;
         r[1] += own * 0.25;
-        if look.cut.is_any() {
-            let share = |is_cut| if is_cut { CUT_SHARES.0 } else { CUT_SHARES.1 };
-            r[0] += (share(look.cut.across) * px).powi(2);
-            r[1] += (share(look.cut.down) * px).powi(2);
-            r[2] += CUT_LOG_SIZE * CUT_LOG_SIZE;
+    }
+    if let Some(left) = &look.left {
+        for (r, more) in r.iter_mut().zip(left.variances()) {
+            *r += more;
         }
     }
     r

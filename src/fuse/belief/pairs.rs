@@ -18,6 +18,8 @@ pub(super) const GATE: f64 = 16.0;
 const LEAST_INSIDE: f64 = 1e-3;
 /// Objects nearer than this are not expected, metres.
 const NEAREST_M: f64 = 0.3;
+/// Objects of which less is in the picture, as a share of a side, are not detected.
+const LEAST_LEFT: f64 = 0.25;
 /// How far beyond the reach objects may still be expected: a factor and metres.
 const MARGIN: (f64, f64) = (1.05, 1.0);
 
@@ -28,6 +30,9 @@ pub(super) struct Pair {
     pub(super) object: usize,
     /// Probability that it is in the picture and in the ranges.
     pub(super) inside: f64,
+    /// Probability that its aim point lies beyond the picture's border and enough of it within, and
+    /// that it is in the ranges.
+    pub(super) beyond: f64,
     /// Probability that it is detected, if it exists.
     pub(super) p_detect: f64,
     /// Where its detectability is read off the curve.
@@ -211,17 +216,21 @@ impl Engine<'_> {
                 *s += m;
             }
         }
-        let inside = self.in_picture(view, &seen, &spread) * self.in_range(seen.range_m);
-        if inside.is_nan() || inside <= LEAST_INSIDE {
+        let (inside, beyond) = self.in_picture(view, &seen, &spread);
+        let in_range = self.in_range(seen.range_m);
+        let (inside, beyond) = (inside * in_range, beyond * in_range);
+        let seen_at_all = inside + self.model.border * beyond;
+        if seen_at_all.is_nan() || seen_at_all <= LEAST_INSIDE {
             return None;
         }
         let visibility = self.visibility(x, &seen);
-        let p_detect = (inside * self.model.curve.at(visibility)).clamp(1e-4, 0.99);
+        let p_detect = (seen_at_all * self.model.curve.at(visibility)).clamp(1e-4, 0.99);
         Some(PairInFull {
             pair: Pair {
                 view,
                 object,
                 inside,
+                beyond,
                 p_detect,
                 visibility,
             },
@@ -232,8 +241,9 @@ impl Engine<'_> {
         })
     }
 
-    /// Probability that the object's reading lies in the picture, or in the sector.
-    fn in_picture(&self, view: usize, seen: &Expected, spread: &Square4) -> f64 {
+    /// Probability that the object's reading lies in the picture, or in the sector; and that it lies
+    /// beyond the picture's border while enough of the object is within.
+    fn in_picture(&self, view: usize, seen: &Expected, spread: &Square4) -> (f64, f64) {
         let platform = &self.platforms[view];
         let sigma = |r: usize| {
             let noise = self.typical[r] * self.model.scales[r];
@@ -245,41 +255,61 @@ impl Engine<'_> {
         match platform.camera.as_deref() {
             Some(camera) => {
                 let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-                within(seen.values[0], -0.5, width - 0.5, sigma(0))
-                    * within(seen.values[1], -0.5, height - 0.5, sigma(1))
+                let inside = within(seen.values[0], -0.5, width - 0.5, sigma(0))
+                    * within(seen.values[1], -0.5, height - 0.5, sigma(1));
+                if !self.has_sizes {
+                    return (inside, 0.0);
+                }
+                let lengths = self.shape.lengths_px(seen.values[2].exp());
+                let mut any = 1.0;
+                for (r, side) in [width, height].into_iter().enumerate() {
+                    let before = lengths[r] * (1.0 - self.aim[r] - LEAST_LEFT).max(0.0);
+                    let after = lengths[r] * (self.aim[r] - LEAST_LEFT).max(0.0);
+                    any *= within(seen.values[r], -0.5 - before, side - 0.5 + after, sigma(r));
+                }
+                (inside, (any - inside).max(0.0))
             }
             None => {
                 let (low, high) = platform.sector;
-                if high - low >= std::f64::consts::TAU - 1e-9 {
+                let inside = if high - low >= std::f64::consts::TAU - 1e-9 {
                     1.0
                 } else {
                     within(seen.values[0], low, high, sigma(0))
-                }
+                };
+                (inside, 0.0)
             }
         }
     }
 
     fn candidate(&self, look: usize, index: usize, pair: &PairInFull) -> Option<CandidateInFull> {
         let detection = &self.looks[look];
+        let ends = pair.seen.of_ends(detection);
+        let (expected, spread) = match &ends {
+            Some(ends) => (
+                &ends.values,
+                &pair.seen.spread_of_ends(detection, &pair.spread),
+            ),
+            None => (&pair.seen.values, &pair.spread),
+        };
         // The column alone rules most detections out.
         let mut e = [0.0; 4];
-        e[0] = detection.values[0] - pair.seen.values[0];
+        e[0] = detection.values[0] - expected[0];
         if detection.is_bearing() {
             e[0] = super::expect::wrapped(e[0]);
         }
         let loose = self.looseness[look];
-        if e[0] * e[0] > GATE * (pair.spread[0][0] + WIDE * loose[0]) {
+        if e[0] * e[0] > GATE * (spread[0][0] + WIDE * loose[0]) {
             return None;
         }
         for r in 1..detection.n {
             if detection.has[r] {
-                e[r] = detection.values[r] - pair.seen.values[r];
-                if e[r] * e[r] > GATE * (pair.spread[r][r] + WIDE * loose[r]) {
+                e[r] = detection.values[r] - expected[r];
+                if e[r] * e[r] > GATE * (spread[r][r] + WIDE * loose[r]) {
                     return None;
                 }
             }
         }
-        let spread = struck(&pair.spread, &detection.has);
+        let spread = struck(spread, &detection.has);
         let rows = (detection.n, detection.n_rows());
         let (ln_likelihood, m2) = log_likelihood(&e, &spread, &loose, rows)?;
         (m2 < GATE).then_some(CandidateInFull {

@@ -371,6 +371,7 @@ fn spread_without_pose(
             *s -= l;
         }
     }
+    let spread = pair.seen.spread_of_ends(look, &spread);
     with_noise(&struck(&spread, &look.has), &c.variances, 1.0)
 }
 

@@ -14,6 +14,11 @@ use crate::frame::{Direction, Enu, Pixel, Point, Ray};
 
 /// At most this many steps to the place a detection suggests.
 const STEPS: usize = 8;
+/// Detections are trusted up to their own uncertainty beyond the greatest range, and no more than
+/// this share of it.
+const SLACK: f64 = 0.05;
+/// Where the trusted ranges end: from this share of the greatest on.
+const NEAR_END: f64 = 0.8;
 /// Steps are over below this, metres.
 const STILL_M: f64 = 1e-7;
 /// Rays that meet no ground within this many times the trusted range meet none.
@@ -62,6 +67,7 @@ impl Engine<'_> {
             self.reach_m = 1.1 * farthest_m.fold(1.0, f64::max);
         }
         self.keep_trusted();
+        self.set_blur();
         self.set_curve();
         self.begin_scores();
         self.measure_ground();
@@ -107,7 +113,7 @@ impl Engine<'_> {
         if look.is_bearing() {
             return Some(platform.along(pose, look.values[0]));
         }
-        let pixel = Pixel::new(look.values[0], look.values[1]);
+        let pixel = Pixel::new(look.mark[0], look.mark[1]);
         let ray = platform.camera.as_deref()?.ray(pixel).ok()?;
         Some(pose.from_camera * ray.direction.xyz())
     }
@@ -154,7 +160,7 @@ impl Engine<'_> {
             .zip(hits)
             .filter_map(|(look, hit)| {
                 let at = (*hit)?;
-                let log_px = look.log_px.filter(|_| !look.cut.is_any())?;
+                let log_px = look.log_px.filter(|_| look.left.is_none())?;
                 let seen = self.expect(look.view, &[at.x, at.y, at.z, 0.0])?;
                 (seen.range_m < self.ranges_m.1).then_some(log_px - seen.log_scale)
             })
@@ -240,15 +246,9 @@ impl Engine<'_> {
             .iter()
             .zip(&self.singles)
             .map(|(look, single)| {
-                let origin = self.poses[look.view].origin;
-                let away = [single.object[0] - origin.x, single.object[1] - origin.y];
-                let range_m = single.range_m.max(0.1);
-                let u = away.map(|a| a / range_m);
-                let c = &single.cov;
-                let along =
-                    u[0] * u[0] * c[0][0] + 2.0 * u[0] * u[1] * c[0][1] + u[1] * u[1] * c[1][1];
+                let along_m = self.along_m(look, single);
                 let slack = if most_m.is_finite() {
-                    along.max(0.0).sqrt().min(0.05 * most_m)
+                    along_m.min(SLACK * most_m)
                 } else {
                     0.0
                 };
@@ -270,6 +270,32 @@ impl Engine<'_> {
         self.index();
         let all: Vec<f64> = self.looks.iter().filter_map(|l| l.log_px).collect();
         self.model.clutter_size = clutter_size(&all);
+    }
+
+    /// How well single detections near the end of the trusted ranges say their range: that decides
+    /// which are taken.
+    fn set_blur(&mut self) {
+        let most_m = self.ranges_m.1;
+        if !most_m.is_finite() {
+            return;
+        }
+        let singles = self.looks.iter().zip(&self.singles);
+        let along = singles
+            .filter(|(_, single)| single.range_m > NEAR_END * most_m)
+            .map(|(look, single)| self.along_m(look, single));
+        let along_m = median(along.collect()).unwrap_or(0.0);
+        self.blur_m = (along_m, along_m.min(SLACK * most_m));
+    }
+
+    /// Standard deviation of a single detection's range, metres.
+    fn along_m(&self, look: &Look, single: &Singleton) -> f64 {
+        let origin = self.poses[look.view].origin;
+        let away = [single.object[0] - origin.x, single.object[1] - origin.y];
+        let range_m = single.range_m.max(0.1);
+        let u = away.map(|a| a / range_m);
+        let c = &single.cov;
+        let along = u[0] * u[0] * c[0][0] + 2.0 * u[0] * u[1] * c[0][1] + u[1] * u[1] * c[1][1];
+        along.max(0.0).sqrt()
     }
 
     /// Before anything is fused scores say nothing; but how they scatter is known.

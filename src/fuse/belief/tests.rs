@@ -12,6 +12,7 @@
 //! the error itself.
 
 mod confusion;
+mod cut;
 mod recorded;
 mod shared;
 mod solution;

@@ -90,7 +90,7 @@ fn measurements(views: &[View]) -> Vec<Measurement> {
                     range: None,
                 },
                 log_size: None,
-                box_px: None,
+                bounds: None,
                 cut: Cut::NONE,
                 class: usize::from(!says_first),
                 score: None,

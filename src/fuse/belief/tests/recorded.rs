@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::adjust::{LevelPlane, Measurement, Problem, Reading};
 use crate::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
-use crate::detection::Cut;
+use crate::detection::{Cut, PixelBox, Side};
 use crate::frame::{Pixel, RigidTransform, Rotation, Vector};
 use crate::fuse::belief::algebra::{Square4, Square6};
 use crate::fuse::belief::curve::Detectability;
@@ -146,10 +146,19 @@ fn measurement(value: &Value) -> Measurement {
         view: index(&value["view"]),
         reading,
         log_size: None,
-        box_px: log_px.map(|l| Vector2::new(l.exp(), 1.0)),
-        cut: Cut {
-            across: is_cut,
-            down: is_cut,
+        bounds: log_px.map(|l| PixelBox {
+            x_min: a - 0.5 * l.exp(),
+            x_max: a + 0.5 * l.exp(),
+            y_min: b - 0.5 * l.exp(),
+            y_max: b + 0.5 * l.exp(),
+        }),
+        cut: if is_cut {
+            Cut {
+                across: Side::Lost,
+                down: Side::Lost,
+            }
+        } else {
+            Cut::NONE
         },
         class: 0,
         score: None,
@@ -223,8 +232,11 @@ impl Recorded {
             max_range_m: number(&given["max_range_m"]),
             min_range_m: 0.0,
         };
-        let engine = Engine::new(&problem, &self.settings);
+        let mut engine = Engine::new(&problem, &self.settings);
         assert_eq!(engine.looks.len(), self.measurements.len());
+        // The other implementation knows no objects beyond the border, and takes the ranges as exact.
+        engine.model.border = 0.0;
+        engine.blur_m = (0.0, 0.0);
         engine
     }
 

@@ -67,7 +67,7 @@ fn drive(n_views: u32, wrong: Wrong, seed: u64) -> (Vec<View>, Vec<Measurement>)
                     },
                 },
                 log_size: None,
-                box_px: None,
+                bounds: None,
                 cut: Cut::NONE,
                 class: 0,
                 score: None,
