@@ -13,7 +13,8 @@ use serde::Serialize;
 
 use super::algebra::{self, Square4};
 use super::engine::Engine;
-use super::solve::{Part, Robust, Row, System};
+use super::solve::{Part, Robust, Row};
+use super::system::System;
 use crate::adjust::Problem;
 
 /// Sensors with fewer readings say nothing of their bias.

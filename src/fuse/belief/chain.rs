@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector, SMatrix, Vector4, Vector6};
 use rayon::prelude::*;
 
-use super::solve::{Coupling, ObjectBlock, PoseBlock, Steps};
+use super::system::{Coupling, ObjectBlock, PoseBlock, Steps};
 use crate::adjust::arrow::{Arrow, Solved};
 
 /// Solved equations of a chain and its border.

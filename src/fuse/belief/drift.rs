@@ -139,7 +139,7 @@ impl Engine<'_> {
         }
         let pulls = normal.pull.clone();
         let turns: Vec<Vector6<f64>> = normal.poses.iter().map(|p| p.1).collect();
-        let (system, (steps, turned)) = super::solve::System::new(normal)?;
+        let (system, (steps, turned)) = super::system::System::new(normal)?;
         let gain = pulls.iter().zip(&steps);
         let gain = gain.map(|(p, s)| p.iter().zip(s).map(|(p, s)| p * s).sum::<f64>());
         let turning = turns.iter().zip(&turned).map(|(p, t)| p.dot(t));

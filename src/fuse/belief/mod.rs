@@ -133,11 +133,13 @@
 //! | `associate` | stage B: memberships, births, deaths | 3.2, 3.3 |
 //! | `solve` | stage B: one Gauss-Newton step of places and poses, and covariances | 3.4 |
 //! | `drift`, `chain` | stage B: errors of poses that drift, stated or found | 3.4 |
+//! | `system` | the normal equations solved | 3.4 |
 //! | `merge` | stage B: objects that are one | 3.3 |
 //! | `evidence` | log-odds that each object is real | 3.5 |
 //! | `learn` | noise, clutter, density, sizes, detectability | 3.5 |
 //! | `bias` | what sensors read too much, all views alike | |
 //! | `effect` | how much less views say than as many independent ones | |
+//! | `rounds` | stage B: rounds until next to nothing changes | 3.7 |
 //! | `outcome` | the whole, and what comes of it | 3.7, 3.8 |
 #![allow(
     clippy::needless_range_loop,
@@ -168,10 +170,12 @@ mod noise;
 mod outcome;
 mod pairs;
 mod register;
+mod rounds;
 mod sequence;
 
 mod single;
 mod solve;
+mod system;
 #[cfg(test)]
 mod tests;
 

@@ -10,32 +10,19 @@ use super::bias::{Bias, Term};
 use super::drift::Drift;
 use super::effect::Repetition;
 use super::engine::Engine;
-use super::evidence::{Evidence, probability};
+use super::evidence::probability;
 use super::learn::LEAST_VIEWS;
 use super::solve::Robust;
 use crate::adjust::Problem;
 use crate::frame::{Enu, Point};
 use crate::fuse::Member;
 
-/// Rounds of association and learning at most.
-const ROUNDS: usize = 12;
-/// And at least.
-const LEAST_ROUNDS: usize = 3;
-/// They are over where next to no detection changes company or has its object move farther than this
-/// many of its standard deviations: one that wavers between two objects would else keep the longest
-/// traverse going.
-const STILL: f64 = 0.2;
-/// What "next to no" is, as a share of the detections.
-const WAVERING: f64 = 5e-3;
 /// Registration is tried again where more than this share of the detections changed company.
 const DOUBT: f64 = 0.015;
 /// Rounds of association and learning after errors of poses were found to drift.
 const DRIFT_ROUNDS: usize = 3;
 /// Steps at most that look for biases.
 const BIAS_STEPS: usize = 4;
-/// Squared scales of the robust steps between registration and association.
-const SCHEDULE: [f64; 7] = [400.0, 100.0, 100.0, 25.0, 25.0, 9.0, 9.0];
-
 /// The fused map with everything that is believed.
 #[derive(Debug, Clone)]
 pub struct Belief {
@@ -166,14 +153,6 @@ pub fn fuse_belief(problem: &Problem<'_>, settings: &BeliefSettings) -> Belief {
     best.outcome(problem, n_starts)
 }
 
-/// Which looks belong together, and where their objects are.
-struct Company {
-    /// Of every look the look before it of the same object.
-    partners: Vec<Option<usize>>,
-    /// And where that object is.
-    places: Vec<Option<[f64; 4]>>,
-}
-
 /// A map from one order of the views.
 struct Start<'a> {
     engine: Engine<'a>,
@@ -212,80 +191,6 @@ impl<'a> Start<'a> {
 }
 
 impl Engine<'_> {
-    /// Of every look the look before it of the same object.
-    fn partners(&self) -> Vec<Option<usize>> {
-        let owners = self.owners();
-        let mut last = vec![None; self.objects.len()];
-        owners
-            .iter()
-            .enumerate()
-            .map(|(look, owner)| {
-                let before = &mut last[(*owner)?];
-                let found = *before;
-                *before = Some(look);
-                found
-            })
-            .collect()
-    }
-
-    fn company(&self) -> Company {
-        let owners = self.owners();
-        let places = owners.iter().map(|o| o.map(|k| self.objects[k]));
-        Company {
-            places: places.collect(),
-            partners: self.partners(),
-        }
-    }
-
-    /// The share of looks that changed company, or whose object moved.
-    fn unrest(&self, before: &Company, now: &Company) -> f64 {
-        let owners = self.owners();
-        let still = |look: usize| match (before.places[look], now.places[look], owners[look]) {
-            (Some(was), Some(is), Some(k)) => {
-                let cov = &self.object_cov[k];
-                (0..4).all(|i| (is[i] - was[i]).powi(2) <= STILL * STILL * cov[i][i])
-            }
-            (was, is, _) => was.is_none() && is.is_none(),
-        };
-        let same = |look: usize| before.partners[look] == now.partners[look];
-        let restless = (0..owners.len()).filter(|&look| !same(look) || !still(look));
-        #[expect(clippy::cast_precision_loss, reason = "counts")]
-        let share = restless.count() as f64 / owners.len().max(1) as f64;
-        share
-    }
-
-    /// Stage B: rounds of association, adjustment and learning.
-    fn refine(&mut self) -> (Evidence, usize, bool) {
-        for c2 in SCHEDULE {
-            let robust = if self.corrects_poses() {
-                Robust::Scale(c2)
-            } else {
-                Robust::Contaminated
-            };
-            self.adjust(1, robust, false);
-        }
-        let mut evidence = Evidence::default();
-        let (mut last, mut before_last) = (self.company(), None);
-        let mut objective = f64::NEG_INFINITY;
-        for round in 0..ROUNDS {
-            evidence = self.round();
-            self.learn(&evidence);
-            let now = self.company();
-            let is_late = round >= LEAST_ROUNDS;
-            if is_late && self.unrest(&last, &now) <= WAVERING {
-                return (evidence, round + 1, true);
-            }
-            // Two maps that follow upon each other for ever: the more probable one is taken.
-            let worse = std::mem::replace(&mut objective, self.objective(&evidence));
-            let swings = before_last.is_some_and(|b| self.unrest(&b, &now) <= WAVERING);
-            if is_late && swings && objective >= worse {
-                return (evidence, round + 1, true);
-            }
-            before_last = Some(std::mem::replace(&mut last, now));
-        }
-        (evidence, ROUNDS, false)
-    }
-
     /// The adjustment that covariances are taken of, and what errors views turned out to share.
     fn last_adjustment(&mut self) -> (Option<Covariances>, Shared) {
         let Some(mut marginal) = self.settled() else {
@@ -363,35 +268,6 @@ impl Engine<'_> {
             }
         }
         marginal
-    }
-
-    /// Logarithm of the posterior, up to a constant: every detection clutter, what each object adds
-    /// to that, and the poses.
-    fn objective(&self, evidence: &Evidence) -> f64 {
-        let clutter: f64 = self.background.iter().map(|b| b.clutter).sum();
-        let objects: f64 = evidence
-            .log_odds
-            .iter()
-            .map(|&l| super::noise::ln_add(0.0, l.clamp(-50.0, 500.0)))
-            .sum();
-        let scores: f64 = self.model.scores.map_or(0.0, |scores| {
-            let logits = self.looks.iter().filter_map(|l| l.logit);
-            logits.map(|x| scores.ln_object(x)).sum()
-        });
-        let mut poses = scores;
-        if self.corrects_poses() {
-            for view in 0..self.n_views() {
-                let information = self.pose_information(view);
-                for (d, i) in self.delta[view].iter().zip(&information) {
-                    poses -= 0.5 * d * d * i;
-                }
-                poses -= self.model.pose_scale.iter().map(|s| s.ln()).sum::<f64>();
-                if let Some((_, ln_det)) = super::algebra::inverse6(&self.pose_cov[view]) {
-                    poses += 0.5 * ln_det;
-                }
-            }
-        }
-        clutter + objects + poses
     }
 
     fn outcome(&mut self, problem: &Problem<'_>, rounds: usize, converged: bool) -> Belief {
