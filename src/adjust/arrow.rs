@@ -259,18 +259,7 @@ fn inverse<const N: usize>(block: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N,
 
 /// Logarithm of the determinant of a symmetric positive definite block.
 fn ln_det<const N: usize>(block: &SMatrix<f64, N, N>) -> f64 {
-    let mut rest = *block;
-    let mut sum = 0.0;
-    for i in 0..N {
-        sum += rest[(i, i)].ln();
-        for r in i + 1..N {
-            let share = rest[(r, i)] / rest[(i, i)];
-            for c in i + 1..N {
-                rest[(r, c)] -= share * rest[(i, c)];
-            }
-        }
-    }
-    sum
+    block.cholesky().map_or(f64::NAN, |c| c.ln_determinant())
 }
 
 #[cfg(test)]

@@ -133,6 +133,10 @@ impl<'a> Field<'a> {
         if column >= self.columns || row >= self.rows {
             return &[];
         }
+        self.members_of(row, column)
+    }
+
+    fn members_of(&self, row: usize, column: usize) -> &[usize] {
         let cell = row * self.columns + column;
         &self.members[self.starts[cell]..self.starts[cell + 1]]
     }
@@ -145,8 +149,7 @@ impl<'a> Field<'a> {
         let mut rocks = Vec::new();
         for row in self.row(y - within_m)..=self.row(y + within_m).min(last(self.rows)) {
             for column in columns.clone() {
-                let cell = row * self.columns + column;
-                rocks.extend(&self.members[self.starts[cell]..self.starts[cell + 1]]);
+                rocks.extend(self.members_of(row, column));
             }
         }
         rocks.sort_unstable();

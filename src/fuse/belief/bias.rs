@@ -13,7 +13,8 @@ use serde::Serialize;
 
 use super::algebra::{self, Square4};
 use super::engine::Engine;
-use super::solve::{Part, Robust, Row};
+use super::normal::Row;
+use super::solve::{Part, Robust};
 use super::system::System;
 use crate::adjust::Problem;
 
@@ -234,28 +235,20 @@ impl Engine<'_> {
 
     /// The normal equations of all objects and poses, bordered by the biases that may be.
     pub(super) fn survey(&mut self) -> Option<Survey> {
-        self.whole(Self::bordered)
+        self.whole(|engine, part| engine.bordered(&part))
     }
 
     fn bordered(&self, part: &Part<'_>) -> Option<Survey> {
         let (n, b) = (part.objects.len(), self.terms.len());
-        let spacing = if self.drifts(part.moving.len(), n).is_some() {
-            2
-        } else {
-            1
-        };
-        let n_poses = if self.corrects_poses() {
-            spacing * self.n_views()
-        } else {
-            0
-        };
+        let begun = self.begin_normal(part);
+        let (spacing, n_poses) = (begun.spacing, begun.poses.len());
         let side = || (vec![Vector4::zeros(); n], vec![Vector6::zeros(); n_poses]);
         let mut border: Vec<Sides> = (0..b).map(|_| side()).collect();
         let mut information = DMatrix::zeros(b, b);
         let mut pull = DVector::zeros(b);
         let mut pulls = Vec::with_capacity(part.edges.len());
         let mut bias_pulls = DMatrix::zeros(b, self.n_views());
-        let normal = self.normal(part, Robust::Contaminated, |row| {
+        let normal = self.with_rows(begun, part, Robust::Contaminated, |row| {
             let toward = row.toward();
             pulls.push((
                 row.view,
@@ -402,9 +395,8 @@ impl Engine<'_> {
         let Some(whole) = (&information + &prior).cholesky() else {
             return f64::NAN;
         };
-        let ln_det = 2.0 * whole.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
         let ln_prior = prior.diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        0.5 * (pull.dot(&whole.solve(&pull)) + ln_prior - ln_det)
+        0.5 * (pull.dot(&whole.solve(&pull)) + ln_prior - whole.ln_determinant())
     }
 
     fn prior_information(&self, on: &[usize]) -> DMatrix<f64> {

@@ -60,8 +60,7 @@ impl Bordered {
             }
         }
         let factor = left.cholesky()?;
-        let diagonal = factor.l_dirty().diagonal();
-        let ln_det = chain.ln_det() + 2.0 * diagonal.iter().map(|d| d.ln()).sum::<f64>();
+        let ln_det = chain.ln_det() + factor.ln_determinant();
         Some(Self {
             chain,
             outward,

@@ -8,6 +8,8 @@ use nalgebra::{Matrix6, SMatrix, Vector6};
 
 use super::engine::Engine;
 use super::learn::LEAST_VIEWS;
+use super::solve::Robust;
+use super::system::System;
 
 /// The drift of views at one place differs by no less than this share of its variance.
 const LEAST_CHANGE: f64 = 1e-4;
@@ -54,7 +56,8 @@ impl Engine<'_> {
 
     /// Finds out whether pose errors drift, and how: by the marginal likelihood of some drifts
     /// against independent errors. Where views are many and objects few, poses have no say of their
-    /// own, and how errors repeat themselves shows in the design effect instead. Standard deviations of errors that drift are at least as stated.
+    /// own, and how errors repeat themselves shows in the design effect instead. Standard deviations
+    /// of errors that drift are at least as stated.
     pub(super) fn find_drift(&mut self) -> bool {
         let asks = self.settings.pose_correction == super::PoseCorrection::PerView;
         let n_views = self.n_views();
@@ -118,8 +121,7 @@ impl Engine<'_> {
     /// poses, by Laplace's method about the present poses and objects.
     fn ln_marginal(&mut self) -> Option<f64> {
         self.drift.fill([0.0; 6]);
-        let normal = self
-            .whole(|engine, part| engine.normal(part, super::solve::Robust::Contaminated, |_| ()));
+        let normal = self.whole(|engine, part| engine.normal(&part, Robust::Contaminated));
         let mut prior = 0.0;
         for view in 0..self.n_views() {
             let variance = self.pose_prior(view);
@@ -139,7 +141,7 @@ impl Engine<'_> {
         }
         let pulls = normal.pull.clone();
         let turns: Vec<Vector6<f64>> = normal.poses.iter().map(|p| p.1).collect();
-        let (system, (steps, turned)) = super::system::System::new(normal)?;
+        let (system, (steps, turned)) = System::new(normal)?;
         let gain = pulls.iter().zip(&steps);
         let gain = gain.map(|(p, s)| p.iter().zip(s).map(|(p, s)| p * s).sum::<f64>());
         let turning = turns.iter().zip(&turned).map(|(p, t)| p.dot(t));

@@ -5,11 +5,10 @@ use std::f64::consts::PI;
 
 use super::engine::{Edge, Engine};
 use super::evidence::Evidence;
-use super::looks::Repeats;
 use super::near::Buckets;
 use super::pairs::Pair;
 use super::single::quantile;
-use super::solve::{Part, Robust};
+use super::solve::Robust;
 
 /// Pairs of objects farther apart (squared Mahalanobis distance of their places) are two.
 const GATE: f64 = 12.0;
@@ -62,22 +61,7 @@ impl Engine<'_> {
     }
 
     fn twins(&mut self) -> Vec<Twins> {
-        let edges = std::mem::take(&mut self.edges);
-        let mut objects = std::mem::take(&mut self.objects);
-        let of: Vec<(usize, usize)> = edges
-            .iter()
-            .map(|e| (e.object, self.looks[e.look].view))
-            .collect();
-        let worth = self.worth(&objects, &of, Repeats::Errors);
-        let cov = self.apart_cov(&Part {
-            objects: &mut objects,
-            edges: &edges,
-            worth: &worth,
-            moving: &[],
-            folded: None,
-        });
-        self.edges = edges;
-        self.objects = objects;
+        let cov = self.whole(|engine, part| engine.apart_cov(&part));
         let mut sigmas: Vec<f64> = cov
             .iter()
             .map(|c| (c[0][0] + c[1][1]).max(1e-6).sqrt())

@@ -133,6 +133,7 @@
 //! | `associate` | stage B: memberships, births, deaths | 3.2, 3.3 |
 //! | `solve` | stage B: one Gauss-Newton step of places and poses, and covariances | 3.4 |
 //! | `drift`, `chain` | stage B: errors of poses that drift, stated or found | 3.4 |
+//! | `normal` | the normal equations, row by row | 3.4 |
 //! | `system` | the normal equations solved | 3.4 |
 //! | `merge` | stage B: objects that are one | 3.3 |
 //! | `evidence` | log-odds that each object is real | 3.5 |
@@ -167,6 +168,7 @@ mod looks;
 mod merge;
 mod near;
 mod noise;
+mod normal;
 mod outcome;
 mod pairs;
 mod register;

@@ -23,6 +23,7 @@ const DOUBT: f64 = 0.015;
 const DRIFT_ROUNDS: usize = 3;
 /// Steps at most that look for biases.
 const BIAS_STEPS: usize = 4;
+
 /// The fused map with everything that is believed.
 #[derive(Debug, Clone)]
 pub struct Belief {
@@ -354,9 +355,7 @@ impl Engine<'_> {
             },
         }
     }
-}
 
-impl Engine<'_> {
     fn biases(&self, problem: &Problem<'_>, biases: &[(Term, f64)]) -> Vec<Bias> {
         let order = super::data::order(problem.views);
         let of_sensor = |sensor: usize| {

@@ -19,7 +19,9 @@ const SCHEDULE: [f64; 7] = [400.0, 100.0, 100.0, 25.0, 25.0, 9.0, 9.0];
 
 /// Which looks belong together, and where their objects are.
 struct Company {
-    /// Of every look the look before it of the same object.
+    /// Of every look its object.
+    owners: Vec<Option<usize>>,
+    /// The look before it of the same object.
     partners: Vec<Option<usize>>,
     /// And where that object is.
     places: Vec<Option<[f64; 4]>>,
@@ -28,7 +30,10 @@ struct Company {
 impl Engine<'_> {
     /// Of every look the look before it of the same object.
     pub(super) fn partners(&self) -> Vec<Option<usize>> {
-        let owners = self.owners();
+        self.partners_by(&self.owners())
+    }
+
+    fn partners_by(&self, owners: &[Option<usize>]) -> Vec<Option<usize>> {
         let mut last = vec![None; self.objects.len()];
         owners
             .iter()
@@ -47,14 +52,14 @@ impl Engine<'_> {
         let places = owners.iter().map(|o| o.map(|k| self.objects[k]));
         Company {
             places: places.collect(),
-            partners: self.partners(),
+            partners: self.partners_by(&owners),
+            owners,
         }
     }
 
-    /// The share of looks that changed company, or whose object moved.
+    /// The share of looks that changed company until now, or whose object moved.
     fn unrest(&self, before: &Company, now: &Company) -> f64 {
-        let owners = self.owners();
-        let still = |look: usize| match (before.places[look], now.places[look], owners[look]) {
+        let still = |look: usize| match (before.places[look], now.places[look], now.owners[look]) {
             (Some(was), Some(is), Some(k)) => {
                 let cov = &self.object_cov[k];
                 (0..4).all(|i| (is[i] - was[i]).powi(2) <= STILL * STILL * cov[i][i])
@@ -62,9 +67,10 @@ impl Engine<'_> {
             (was, is, _) => was.is_none() && is.is_none(),
         };
         let same = |look: usize| before.partners[look] == now.partners[look];
-        let restless = (0..owners.len()).filter(|&look| !same(look) || !still(look));
+        let n = now.owners.len();
+        let restless = (0..n).filter(|&look| !same(look) || !still(look));
         #[expect(clippy::cast_precision_loss, reason = "counts")]
-        let share = restless.count() as f64 / owners.len().max(1) as f64;
+        let share = restless.count() as f64 / n.max(1) as f64;
         share
     }
 
@@ -91,8 +97,8 @@ impl Engine<'_> {
             }
             // Two maps that follow upon each other for ever: the more probable one is taken.
             let worse = std::mem::replace(&mut objective, self.objective(&evidence));
-            let swings = before_last.is_some_and(|b| self.unrest(&b, &now) <= WAVERING);
-            if is_late && swings && objective >= worse {
+            let swings = |b: Company| self.unrest(&b, &now) <= WAVERING;
+            if is_late && objective >= worse && before_last.is_some_and(swings) {
                 return (evidence, round + 1, true);
             }
             before_last = Some(std::mem::replace(&mut last, now));

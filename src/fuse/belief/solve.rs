@@ -9,7 +9,8 @@ use super::algebra::{
 use super::engine::{Edge, Engine};
 use super::looks::Repeats;
 use super::noise::{robust_weight, with_noise};
-use super::system::{Coupling, PoseBlock, System};
+use super::normal::{Normal, Row, times};
+use super::system::System;
 
 /// Objects move by at most this share of the range of the nearest view that detected them ...
 const STEP_SHARE: f64 = 0.2;
@@ -52,26 +53,10 @@ pub(super) enum Robust {
     Scale(f64),
 }
 
-/// The rows of a detection that may be of an object.
-pub(super) struct Row {
-    pub(super) look: usize,
-    pub(super) object: usize,
-    pub(super) view: usize,
-    range_m: f64,
-    /// The slant range that is expected.
-    pub(super) slant_m: f64,
-    pub(super) by_object: Square4,
-    pub(super) by_pose: ByPose,
-    pub(super) n: usize,
-    pub(super) e: [f64; 4],
-    /// Weighted information of the rows.
-    pub(super) information: Square4,
-}
-
 impl Engine<'_> {
     /// One Gauss-Newton step, which moves the objects of the part and the poses of its views.
     pub(super) fn step(&mut self, part: Part<'_>, robust: Robust, marginals: bool) -> Stepped {
-        let mut normal = self.normal(&part, robust, |_| ());
+        let mut normal = self.normal(&part, robust);
         let conditional: Vec<Square4> = normal.information.iter().map(inverse_or_zero).collect();
         let nearest_m = std::mem::take(&mut normal.nearest_m);
         let (steps, marginal) = if self.corrects_poses() {
@@ -102,14 +87,19 @@ impl Engine<'_> {
         }
     }
 
-    /// The normal equations of a part, every row shown to `each`.
-    pub(super) fn normal(
+    /// The normal equations of a part.
+    pub(super) fn normal(&self, part: &Part<'_>, robust: Robust) -> Normal {
+        self.with_rows(self.begin_normal(part), part, robust, |_| ())
+    }
+
+    /// Normal equations with the rows of a part, each shown to `each`.
+    pub(super) fn with_rows(
         &self,
+        mut normal: Normal,
         part: &Part<'_>,
         robust: Robust,
         mut each: impl FnMut(&Row),
     ) -> Normal {
-        let mut normal = self.begin_normal(part);
         let mut take = |row: &Row| {
             normal.add(row, part.moving, self.corrects_poses());
             each(row);
@@ -136,7 +126,7 @@ impl Engine<'_> {
     }
 
     /// The normal equations before any look: priors, and looks that were folded into objects.
-    fn begin_normal(&self, part: &Part<'_>) -> Normal {
+    pub(super) fn begin_normal(&self, part: &Part<'_>) -> Normal {
         let n = part.objects.len();
         let mut normal = Normal {
             information: Vec::with_capacity(n),
@@ -369,7 +359,7 @@ impl Engine<'_> {
     }
 
     /// What `of` makes of all objects, edges and views at this moment.
-    pub(super) fn whole<T>(&mut self, of: impl FnOnce(&Self, &Part<'_>) -> T) -> T {
+    pub(super) fn whole<T>(&mut self, of: impl FnOnce(&mut Self, Part<'_>) -> T) -> T {
         let edges = std::mem::take(&mut self.edges);
         let mut objects = std::mem::take(&mut self.objects);
         let views: Vec<(usize, usize)> = edges
@@ -385,7 +375,7 @@ impl Engine<'_> {
             moving: &moving,
             folded: None,
         };
-        let made = of(self, &part);
+        let made = of(self, part);
         self.edges = edges;
         self.objects = objects;
         made
@@ -398,24 +388,10 @@ impl Engine<'_> {
         robust: Robust,
         marginals: bool,
     ) -> Option<Stepped> {
-        let edges = std::mem::take(&mut self.edges);
-        let mut objects = std::mem::take(&mut self.objects);
-        let of: Vec<(usize, usize)> = edges
-            .iter()
-            .map(|e| (e.object, self.looks[e.look].view))
-            .collect();
-        let moving: Vec<usize> = (0..self.n_views()).collect();
         let mut last = None;
         for at in 0..steps {
-            let worth = self.worth(&objects, &of, Repeats::Errors);
-            let part = Part {
-                objects: &mut objects,
-                edges: &edges,
-                worth: &worth,
-                moving: &moving,
-                folded: None,
-            };
-            let stepped = self.step(part, robust, marginals && at + 1 == steps);
+            let asks = marginals && at + 1 == steps;
+            let stepped = self.whole(|engine, part| engine.step(part, robust, asks));
             let still = stepped.move_m < 1e-5;
             self.object_cov.clone_from(&stepped.conditional);
             last = Some(stepped);
@@ -423,94 +399,11 @@ impl Engine<'_> {
                 break;
             }
         }
-        self.edges = edges;
-        self.objects = objects;
         if self.corrects_poses() {
             self.update_pose_cov();
         }
         last
     }
-}
-
-/// The normal equations on their way.
-pub(super) struct Normal {
-    pub(super) information: Vec<Square4>,
-    pub(super) pull: Vec<[f64; 4]>,
-    /// How near the nearest view of each object is, metres.
-    nearest_m: Vec<f64>,
-    pub(super) poses: Vec<PoseBlock>,
-    pub(super) couplings: Vec<Coupling>,
-    /// Couplings between poses, where they drift.
-    pub(super) links: Vec<(usize, usize, SMatrix<f64, 6, 6>)>,
-    /// How many unknowns a view has among the poses: itself, and its drift.
-    pub(super) spacing: usize,
-}
-
-impl Normal {
-    fn add(&mut self, row: &Row, moving: &[usize], corrects_poses: bool) {
-        let k = row.object;
-        self.nearest_m[k] = self.nearest_m[k].min(row.range_m);
-        let a = &mut self.information[k];
-        add_information(a, &row.by_object, &row.information, row.n, 1.0);
-        let toward = row.toward();
-        for (p, h) in self.pull[k].iter_mut().zip(row.object_pull(&toward)) {
-            *p += h;
-        }
-        if corrects_poses && let Ok(p) = moving.binary_search(&row.view) {
-            let p = p * self.spacing;
-            let (a, b) = &mut self.poses[p];
-            row.add_to_pose(a, b, &toward);
-            self.couplings.push((k, p, row.coupling()));
-        }
-    }
-}
-
-impl Row {
-    /// The weighted residual.
-    pub(super) fn toward(&self) -> [f64; 4] {
-        times(&self.information, &self.e)
-    }
-
-    pub(super) fn object_pull(&self, toward: &[f64; 4]) -> [f64; 4] {
-        std::array::from_fn(|i| (0..self.n).map(|r| self.by_object[r][i] * toward[r]).sum())
-    }
-
-    /// Adds to a pose's information; the rows' own is diagonal where poses move.
-    fn add_to_pose(&self, a: &mut SMatrix<f64, 6, 6>, b: &mut Vector6<f64>, toward: &[f64; 4]) {
-        for r in 0..self.n {
-            let w = self.information[r][r];
-            if w == 0.0 {
-                continue;
-            }
-            let h = &self.by_pose[r];
-            for c in 0..6 {
-                b[c] += h[c] * toward[r];
-                let scale = w * h[c];
-                let mut column = a.column_mut(c);
-                for (x, y) in column.iter_mut().zip(h) {
-                    *x += scale * y;
-                }
-            }
-        }
-    }
-
-    fn coupling(&self) -> SMatrix<f64, 4, 6> {
-        let mut out = SMatrix::<f64, 4, 6>::zeros();
-        for r in 0..self.n {
-            let w = self.information[r][r];
-            for c in 0..6 {
-                let scale = w * self.by_pose[r][c];
-                for i in 0..4 {
-                    out[(i, c)] += scale * self.by_object[r][i];
-                }
-            }
-        }
-        out
-    }
-}
-
-fn times(a: &Square4, b: &[f64; 4]) -> [f64; 4] {
-    std::array::from_fn(|i| a[i].iter().zip(b).map(|(a, b)| a * b).sum())
 }
 
 fn inverse_or_zero(a: &Square4) -> Square4 {

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, Vector4, Vector6};
 
 use super::algebra::to_matrix4;
 use super::chain::Bordered;
-use super::solve::Normal;
+use super::normal::Normal;
 use crate::adjust::arrow::{Arrow, Solved};
 
 pub(super) type ObjectBlock = (SMatrix<f64, 4, 4>, Vector4<f64>);

@@ -21,6 +21,7 @@ use serde_json::Value;
 
 use super::engine::{Edge, Engine};
 use super::evidence::Evidence;
+use super::expect::Expected;
 use super::looks::Repeats;
 use super::noise::{log_likelihood, robust_weight};
 use super::pairs::Expectation;
@@ -100,7 +101,6 @@ fn projections_and_their_derivatives() {
 
 #[test]
 fn derivatives_against_central_differences() {
-    const STEP: f64 = 1e-6;
     for recorded in both() {
         for radius_m in [0.0, 0.3] {
             let mut settings = recorded.settings.clone();
@@ -109,39 +109,53 @@ fn derivatives_against_central_differences() {
             engine.settings = &settings;
             for pair in engine.expectation().pairs.iter().step_by(9) {
                 let (view, x) = (pair.view, engine.objects[pair.object]);
-                let seen = engine.expect(view, &x).unwrap();
-                for i in 0..4 {
-                    let at = |step: f64| {
-                        let mut x = x;
-                        x[i] += step;
-                        engine.expect(view, &x).unwrap().values
-                    };
-                    let (above, below) = (at(STEP), at(-STEP));
-                    for r in 0..4 {
-                        let slope = (above[r] - below[r]) / (2.0 * STEP);
-                        let off = (seen.by_object[r][i] - slope).abs();
-                        assert!(off < 1e-6 * slope.abs().max(1.0), "row {r} by unknown {i}");
-                    }
-                }
-                let delta = engine.delta[view];
-                for i in 0..6 {
-                    let mut at = |step: f64| {
-                        let mut delta = delta;
-                        delta[i] += step;
-                        engine.set_delta(view, delta);
-                        engine.expect(view, &x).unwrap().values
-                    };
-                    let (above, below) = (at(STEP), at(-STEP));
-                    for r in 0..4 {
-                        let slope = (above[r] - below[r]) / (2.0 * STEP);
-                        let off = (seen.by_pose[r][i] - slope).abs();
-                        assert!(off < 1e-6 * slope.abs().max(1.0), "row {r} by error {i}");
-                    }
-                }
-                engine.set_delta(view, delta);
+                assert_derivatives(&mut engine, view, x, |engine, x| {
+                    engine.expect(view, x).unwrap()
+                });
             }
         }
     }
+}
+
+/// The derivatives of what is expected of an object, by its unknowns and by the errors of the view's
+/// pose.
+fn assert_derivatives<'a>(
+    engine: &mut Engine<'a>,
+    view: usize,
+    x: [f64; 4],
+    expected: impl Fn(&Engine<'a>, &[f64; 4]) -> Expected,
+) {
+    const STEP: f64 = 1e-6;
+    let seen = expected(engine, &x);
+    for i in 0..4 {
+        let at = |step: f64| {
+            let mut x = x;
+            x[i] += step;
+            expected(engine, &x).values
+        };
+        let (above, below) = (at(STEP), at(-STEP));
+        for r in 0..4 {
+            let slope = (above[r] - below[r]) / (2.0 * STEP);
+            let off = (seen.by_object[r][i] - slope).abs();
+            assert!(off < 1e-6 * slope.abs().max(1.0), "row {r} by unknown {i}");
+        }
+    }
+    let delta = engine.delta[view];
+    for i in 0..6 {
+        let mut at = |step: f64| {
+            let mut delta = delta;
+            delta[i] += step;
+            engine.set_delta(view, delta);
+            expected(engine, &x).values
+        };
+        let (above, below) = (at(STEP), at(-STEP));
+        for r in 0..4 {
+            let slope = (above[r] - below[r]) / (2.0 * STEP);
+            let off = (seen.by_pose[r][i] - slope).abs();
+            assert!(off < 1e-6 * slope.abs().max(1.0), "row {r} by error {i}");
+        }
+    }
+    engine.set_delta(view, delta);
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector2};
 
+use super::assert_derivatives;
 use super::recorded::Recorded;
 use crate::adjust::{LevelPlane, Measurement, Problem, Reading};
 use crate::camera::{Camera, Intrinsics, Lens, Mount, PanTilt, Pinhole};
@@ -102,7 +103,6 @@ fn ends_lie_before_the_aim_point() {
 
 #[test]
 fn derivatives_of_ends_against_central_differences() {
-    const STEP: f64 = 1e-6;
     let recorded = Recorded::read(include_str!("../../../../tests/data/belief/pixels.json"));
     let mut engine = recorded.engine();
     let mut n = 0;
@@ -111,39 +111,10 @@ fn derivatives_of_ends_against_central_differences() {
         let look = cut_look(&engine, view);
         let seen = engine.expect(view, &x).unwrap();
         let ends = seen.of_ends(&look).unwrap();
-        let values = |engine: &Engine<'_>, x: &[f64; 4]| {
+        assert_derivatives(&mut engine, view, x, |engine, x| {
             let seen = engine.expect(view, x).unwrap();
-            seen.of_ends(&look).unwrap().values
-        };
-        for i in 0..4 {
-            let at = |step: f64| {
-                let mut x = x;
-                x[i] += step;
-                values(&engine, &x)
-            };
-            let (above, below) = (at(STEP), at(-STEP));
-            for r in 0..4 {
-                let slope = (above[r] - below[r]) / (2.0 * STEP);
-                let off = (ends.by_object[r][i] - slope).abs();
-                assert!(off < 1e-6 * slope.abs().max(1.0), "row {r} by unknown {i}");
-            }
-        }
-        let delta = engine.delta[view];
-        for i in 0..6 {
-            let mut at = |step: f64| {
-                let mut delta = delta;
-                delta[i] += step;
-                engine.set_delta(view, delta);
-                values(&engine, &x)
-            };
-            let (above, below) = (at(STEP), at(-STEP));
-            for r in 0..4 {
-                let slope = (above[r] - below[r]) / (2.0 * STEP);
-                let off = (ends.by_pose[r][i] - slope).abs();
-                assert!(off < 1e-6 * slope.abs().max(1.0), "row {r} by error {i}");
-            }
-        }
-        engine.set_delta(view, delta);
+            seen.of_ends(&look).unwrap()
+        });
         // A spread turned into that of the ends is the spread by the derivatives of the ends.
         let cov = &engine.object_cov[pair.object];
         let turned = seen.spread_of_ends(&look, &algebra::spread(&seen.by_object, cov, 4));
